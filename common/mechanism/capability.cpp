@@ -8,6 +8,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "common/mechanism/linkage_terms.hpp"
+
 namespace trocar::mechanism {
 namespace {
 
@@ -31,11 +33,36 @@ Figures worse(const Figures& a, const Figures& b) noexcept {
   out.angle_rms_rad = std::max(a.angle_rms_rad, b.angle_rms_rad);
   out.peak_force_n = std::min(a.peak_force_n, b.peak_force_n);
   out.continuous_force_n = std::min(a.continuous_force_n, b.continuous_force_n);
+  out.continuous_force_best_n = std::min(a.continuous_force_best_n, b.continuous_force_best_n);
   out.mass_least_kg = std::min(a.mass_least_kg, b.mass_least_kg);
   out.mass_most_kg = std::max(a.mass_most_kg, b.mass_most_kg);
   out.inertia_kg_m2 = std::max(a.inertia_kg_m2, b.inertia_kg_m2);
   return out;
 }
+
+// Forces f at zero moment: |normal . f| <= limit for each pair of drives.
+struct ForcePolygon {
+  std::array<Vec2, 6> normal;
+  std::array<double, 6> limit{};
+  std::size_t edges = 0;
+
+  ForcePolygon(const Mat43& H, const Vec4& torque_limit_nm) noexcept {
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      for (Eigen::Index j = i + 1; j < 4; ++j) {
+        const Vec3 n = H.row(i).transpose().cross(H.row(j).transpose());
+        if (n.head<2>().squaredNorm() == 0.0) continue;
+        normal[edges] = n.head<2>();
+        limit[edges++] = torque_limit_nm.dot((H * n).cwiseAbs());
+      }
+    }
+  }
+  [[nodiscard]] bool holds(const Vec2& force) const noexcept {
+    for (std::size_t k = 0; k < edges; ++k) {
+      if (std::abs(normal[k].dot(force)) > limit[k] * (1.0 + 1e-9)) return false;  // corners lie on two limits, up to rounding
+    }
+    return true;
+  }
+};
 
 // Translation rows of F give the position figures, the rotation row (if any) those of the angle.
 template <class Map>
@@ -63,6 +90,7 @@ Status figures_at(const TwinModel& model, const DriveLimits& drives, const Vec3&
   resolution(F, drives.encoder_counts_per_turn, out);
   out.peak_force_n = weakest_force(H, drives.peak_torque_nm);
   out.continuous_force_n = weakest_force(H, drives.continuous_torque_nm);
+  out.continuous_force_best_n = strongest_force(H, drives.continuous_torque_nm);
   mass_range(M.topLeftCorner<2, 2>(), out);
   out.inertia_kg_m2 = M(2, 2);
   return Status::Ok;
@@ -80,6 +108,7 @@ Status figures_at(const FiveBarModel& model, const DriveLimits& drives, const Ve
   resolution(J, drives.encoder_counts_per_turn, out);
   out.peak_force_n = weakest_force(J, drives.peak_torque_nm.head<2>());
   out.continuous_force_n = weakest_force(J, drives.continuous_torque_nm.head<2>());
+  out.continuous_force_best_n = strongest_force(J, drives.continuous_torque_nm.head<2>());
   const Mat2 J_inverse = J.inverse();
   mass_range(J_inverse.transpose() * D * J_inverse, out);
   return Status::Ok;
@@ -184,20 +213,37 @@ Square largest_square(const FiveBarModel& model, double least_distance, double s
 }
 
 double weakest_force(const Mat43& H, const Vec4& torque_limit_nm) noexcept {
+  const ForcePolygon polygon(H, torque_limit_nm);
   double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i + 1; j < 4; ++j) {
-      const Vec3 n = H.row(i).transpose().cross(H.row(j).transpose());
-      const double across = n.head<2>().norm();
-      if (across > 0.0) least = std::min(least, torque_limit_nm.dot((H * n).cwiseAbs()) / across);
-    }
-  }
+  for (std::size_t k = 0; k < polygon.edges; ++k) least = std::min(least, polygon.limit[k] / polygon.normal[k].norm());
   return std::isfinite(least) ? least : 0.0;
 }
 
+double strongest_force(const Mat43& H, const Vec4& torque_limit_nm) noexcept {
+  const ForcePolygon polygon(H, torque_limit_nm);
+  double most = 0.0;
+  for (std::size_t i = 0; i < polygon.edges; ++i) {
+    for (std::size_t j = i + 1; j < polygon.edges; ++j) {
+      const double det = cross(polygon.normal[i], polygon.normal[j]);
+      if (det == 0.0) continue;
+      for (const double side : {-1.0, 1.0}) {
+        const Vec2 corner = perp(side * polygon.limit[j] * polygon.normal[i] - polygon.limit[i] * polygon.normal[j]) / det;
+        if (polygon.holds(corner)) most = std::max(most, corner.norm());
+      }
+    }
+  }
+  return most;
+}
+
+// f = J^-T tau fills a parallelogram: edges limit_i / |column i of J| away, corners where both torques are at their limit.
 double weakest_force(const Mat2& dend_dtheta, const Vec2& torque_limit_nm) noexcept {
-  // f = J^-T tau is a parallelogram; the edges along generator j lie limit_i / |column i of J| away.
   return (torque_limit_nm.array() / dend_dtheta.colwise().norm().transpose().array()).minCoeff();
+}
+
+double strongest_force(const Mat2& dend_dtheta, const Vec2& torque_limit_nm) noexcept {
+  const Mat2 J_inverse = dend_dtheta.inverse();
+  const Vec2 first = torque_limit_nm(0) * J_inverse.row(0).transpose(), second = torque_limit_nm(1) * J_inverse.row(1).transpose();
+  return std::max((first + second).norm(), (first - second).norm());
 }
 
 }  // namespace trocar::mechanism

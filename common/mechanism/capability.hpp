@@ -34,6 +34,7 @@ struct Figures {
   double angle_step_rad{}, angle_rms_rad{};
   // Force available in every direction at zero moment about the handle (the weakest direction), friction not subtracted.
   double peak_force_n{}, continuous_force_n{};
+  double continuous_force_best_n{};  // in the best direction, else as above
   // Extreme eigenvalues of the translational block of M: kg felt along the lightest and heaviest direction, rotation held.
   double mass_least_kg{}, mass_most_kg{};
   double inertia_kg_m2{};  // M(2, 2): about the handle, position held
@@ -67,7 +68,10 @@ struct Square {
 // wrenches u = H^T tau form a zonotope, bounded by |n . u| <= sum_k limit_k |n . h_k| for every n = h_i x h_j (h_k row k
 // of H); its slice at zero moment is a polygon about the origin whose edges are limit sums over |n_xy| away.
 [[nodiscard]] double weakest_force(const Mat43& H, const Vec4& torque_limit_nm) noexcept;
+// Distance (N) of that polygon's farthest corner: the force in the best direction.
+[[nodiscard]] double strongest_force(const Mat43& H, const Vec4& torque_limit_nm) noexcept;
 // The same for one linkage: f = J^-T tau.
 [[nodiscard]] double weakest_force(const Mat2& dend_dtheta, const Vec2& torque_limit_nm) noexcept;
+[[nodiscard]] double strongest_force(const Mat2& dend_dtheta, const Vec2& torque_limit_nm) noexcept;
 
 }  // namespace trocar::mechanism
