@@ -57,6 +57,7 @@ Status inverse(const FiveBarModel& model, const Vec2& end_m, const Vec2& theta_n
   if (!end_m.allFinite() || !theta_near_rad.allFinite()) return Status::NotFinite;
   Vec2 theta;
   std::array<Vec2, 2> w;
+  std::array<double, 2> elbow_x{};
   bool stretched = false;
   for (std::size_t i = 0; i < 2; ++i) {
     const double l = model.proximal[i].length_m, r = model.distal[i].length_m;
@@ -71,6 +72,7 @@ Status inverse(const FiveBarModel& model, const Vec2& end_m, const Vec2& theta_n
 
     const Vec2 link = (along * d + (i == 0 ? height : -height) * perp(d)) / distance;
     w[i] = d - link;
+    elbow_x[i] = end_m.x() - w[i].x();
     const auto row = static_cast<Eigen::Index>(i);
     const double near = theta_near_rad(row);
     theta(row) = near + std::remainder(std::atan2(link.y(), link.x()) - near, 2.0 * std::numbers::pi);
@@ -79,6 +81,7 @@ Status inverse(const FiveBarModel& model, const Vec2& end_m, const Vec2& theta_n
   const double parallel = cross(w[0], w[1]) / (model.distal[0].length_m * model.distal[1].length_m);
   if (std::abs(parallel) < singular_sine) return Status::Singular;
   if (parallel < 0.0) return Status::Unreachable;
+  if (!(elbow_x[0] < elbow_x[1])) return Status::Unreachable;
   theta_rad = theta;
   return Status::Ok;
 }
@@ -97,8 +100,10 @@ double singularity_distance(const FiveBarModel& model, const Vec2& theta_rad, co
   const Vec2 w0 = pose.end - pose.elbow[0], w1 = pose.end - pose.elbow[1];
   const double r0 = model.distal[0].length_m, r1 = model.distal[1].length_m;
   const Vec2 u0(std::cos(theta_rad(0)), std::sin(theta_rad(0))), u1(std::cos(theta_rad(1)), std::sin(theta_rad(1)));
-  const double least = std::min({cross(w0, w1) / (r0 * r1), cross(w0, u0) / r0, cross(u1, w1) / r1});
-  return least > 0.0 ? std::min(least, 1.0) : 0.0;  // NaN becomes 0 as well
+  const double parallel = cross(w0, w1) / (r0 * r1), serial0 = cross(w0, u0) / r0, serial1 = cross(u1, w1) / r1;
+  const bool own_modes = parallel > 0.0 && serial0 > 0.0 && serial1 > 0.0 && pose.elbow[0].x() < pose.elbow[1].x();
+  if (!own_modes || !std::isfinite(parallel + serial0 + serial1)) return 0.0;
+  return std::min({parallel, serial0, serial1, 1.0});
 }
 
 Status dynamics(const FiveBarModel& model, const Vec2& theta_rad, const Vec2& theta_dot_rad_s, Mat2& D, Mat2& C) noexcept {

@@ -5,7 +5,8 @@
 //   w_i . P' = (w_i . e_i) theta_i'        e_i = dE_i/dtheta_i = l_i u(theta_i + pi/2);  A P' = B theta', J = A^-1 B
 //
 // Modes. Assembly: sin(phi_1 - phi_0) > 0 (the same as cross(E_1 - E_0, P - E_0) > 0). Working: elbows outward,
-// sin(theta_0 - phi_0) > 0 and sin(phi_1 - theta_1) > 0. `forward` knows the assembly mode only; `inverse` gives both.
+// sin(theta_0 - phi_0) > 0 and sin(phi_1 - theta_1) > 0, elbow 0 left of elbow 1 (links of one plane cannot cross).
+// `forward` knows the assembly mode only; `inverse` gives both.
 #pragma once
 
 #include <array>
@@ -24,7 +25,7 @@ struct FiveBarPose {
 // Unreachable: elbows further apart than the distal links together, or one circle inside of the other.
 [[nodiscard]] Status forward(const FiveBarModel& model, const Vec2& theta_rad, FiveBarPose& out) noexcept;
 
-// Each angle is returned within pi of theta_near_rad. Unreachable also when P needs the other assembly mode, so that
+// Each angle is returned within pi of theta_near_rad. Unreachable also when P needs another mode, so that
 // forward(inverse(P)) = P whenever this says Ok.
 [[nodiscard]] Status inverse(const FiveBarModel& model, const Vec2& end_m, const Vec2& theta_near_rad, Vec2& theta_rad) noexcept;
 
@@ -34,7 +35,7 @@ struct FiveBarPose {
 // min(sin(phi_1 - phi_0), sin(theta_0 - phi_0), sin(phi_1 - theta_1)), not below 0.
 //   first    0 at a parallel singularity (distal links in line: P moves with the motors locked, J unbounded)
 //   others   0 at a serial singularity (an arm stretched or folded: P cannot move along it, J loses rank)
-// 1 only where distal links and both elbows make right angles. 0 also beyond, in a foreign working or assembly mode.
+// 1 only where distal links and both elbows make right angles. 0 also beyond, in any foreign mode, and for NaN.
 [[nodiscard]] double singularity_distance(const FiveBarModel& model, const Vec2& theta_rad, const FiveBarPose& pose) noexcept;
 
 // Closed chain: D theta'' + C theta' = tau - J^T f (thesis A.2; f the force of the linkage on its surroundings).
