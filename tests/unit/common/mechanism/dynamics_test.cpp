@@ -209,7 +209,7 @@ Drift simulate_twin(double coriolis_share) {
     q = state.q;
   };
   integrate<Vec3>(
-      state.x, Vec3(0.35, -0.25, 9.0), 2.5e-4,
+      state.x, Vec3(0.6, -0.4, 12.0), 1e-3,
       [&](const Vec3& x, const Vec3& v) -> Vec3 {
         Mat3 M, C;
         terms(x, v, M, C);
@@ -238,7 +238,7 @@ Drift simulate_five_bar(double coriolis_share) {
   Drift drift;
   double first = 0.0;
   integrate<Vec2>(
-      start, Vec2(4.0, 6.0), 2.5e-4,
+      start, Vec2(4.0, 6.0), 5e-4,
       [&](const Vec2& theta, const Vec2& v) -> Vec2 {
         Mat2 D, C, J;
         EXPECT_EQ(forward(model, theta, pose), Status::Ok);
