@@ -166,8 +166,8 @@ Square search(double reach, double step_m, const Test& test) noexcept {
   double best_off_axis = std::numeric_limits<double>::infinity();
   for (int row = -half; row <= half; ++row) {
     int diagonal = 0;
-    for (int column = -half; column <= half; ++column) {
-      const auto c = static_cast<std::size_t>(column + half);
+    std::size_t c = 0;
+    for (int column = -half; column <= half; ++column, ++c) {
       const int above = side[c], left = c == 0 ? 0 : side[c - 1];
       side[c] = test(Vec2(column * step, row * step)) ? 1 + std::min({above, left, diagonal}) : 0;
       diagonal = above;

@@ -17,9 +17,9 @@ namespace trocar::mechanism {
 
 struct TwinState {
   Vec3 x = Vec3::Zero();  // x_m, y_m, theta_rad (not wrapped)
+  double residual_m{};    // |P1 - P0| - coupling_m: 0 for four angles that agree
   Vec4 q = Vec4::Zero();  // joint angles, rad
   std::array<FiveBarPose, 2> linkage;
-  double residual_m{};  // |P1 - P0| - coupling_m: 0 for four angles that agree
 };
 
 // Pose of the rigid coupling that fits both measured end points best: least |P0 - p0|^2 + |P1 - p1|^2, which is the
