@@ -1,0 +1,2 @@
+add_executable(mechanism_benchmark mechanism_benchmark.cpp)
+target_link_libraries(mechanism_benchmark PRIVATE trocar_options common_mechanism benchmark::benchmark benchmark::benchmark_main)
