@@ -11,9 +11,7 @@ namespace object = hal::canopen::object;
 constexpr bool is_mapping(std::uint16_t index) noexcept {
   return (index >= 0x1600 && index <= 0x17FF) || (index >= 0x1A00 && index <= 0x1BFF);
 }
-constexpr bool is_pdo(std::uint16_t index) noexcept {
-  return (index >= 0x1400 && index <= 0x15FF) || (index >= 0x1800 && index <= 0x19FF);
-}
+constexpr bool is_pdo(std::uint16_t index) noexcept { return (index >= 0x1400 && index <= 0x15FF) || (index >= 0x1800 && index <= 0x19FF); }
 constexpr Object from_mapping(std::uint32_t entry) noexcept {
   return {static_cast<std::uint16_t>(entry >> 16), static_cast<std::uint8_t>(entry >> 8), static_cast<std::uint8_t>((entry & 0xFF) / 8)};
 }
