@@ -213,7 +213,7 @@ class RigLink {
 
   [[nodiscard]] std::size_t fresh_drives() const noexcept {
     std::size_t n = 0;
-    for (std::size_t i = 0; i < master_.drives(); ++i) n += master_.drive(i).fresh() ? 1 : 0;
+    for (std::size_t i = 0; i < master_.drives(); ++i) n += master_.drive(i).fresh() ? 1u : 0u;
     return n;
   }
 

@@ -37,6 +37,12 @@ void DriveMaster::fail(DriveProblem problem, std::int64_t now_ns) noexcept {
   enter(DrivePhase::Pause, now_ns);
 }
 
+void DriveMaster::blame_step(const char* remedy) noexcept {
+  report_.object = step().object;
+  report_.reading_back = written_ || !step().write;
+  report_.remedy = remedy;
+}
+
 void DriveMaster::receive(const CanFrame& frame, std::int64_t now_ns) noexcept {
   if (frame.id == cob_feedback(node_)) {
     if (frame.length != 8) {
@@ -89,11 +95,9 @@ void DriveMaster::heartbeat(NmtState state, std::int64_t now_ns) noexcept {
 }
 
 void DriveMaster::finish_exchange(std::int64_t now_ns) noexcept {
-  report_.object = step().object;
-  report_.remedy = step().remedy;
-  report_.reading_back = written_ || !step().write;
   if (sdo_.state() == SdoClient::State::Aborted) {
     ++counters_.sdo_aborts;
+    blame_step(step().remedy);
     report_.actual = sdo_.abort_code();
     fail(DriveProblem::SdoAborted, now_ns);
     return;
@@ -113,6 +117,7 @@ void DriveMaster::finish_exchange(std::int64_t now_ns) noexcept {
     const bool good = step().expect == SetupStep::Expect::Anything || (step().expect == SetupStep::Expect::Near ? near : equal);
     if (!good) {
       ++counters_.readback_errors;
+      blame_step(step().remedy);
       report_.expected = wanted & step().mask;
       report_.actual = actual & step().mask;
       fail(DriveProblem::ReadsBackWrong, now_ns);
@@ -138,9 +143,7 @@ void DriveMaster::supervise(std::int64_t now_ns) noexcept {
     case DrivePhase::Configure:
       if (sdo_.update(now_ns, sdo_timeout_ns) == SdoClient::State::TimedOut) {
         ++counters_.sdo_timeouts;
-        report_.object = step().object;
-        report_.reading_back = written_ || !step().write;
-        report_.remedy = "check its supply and its cable";
+        blame_step("check its supply and its cable");
         fail(DriveProblem::SdoTimeout, now_ns);
       }
       break;

@@ -93,6 +93,7 @@ class DriveMaster {
  private:
   void enter(DrivePhase phase, std::int64_t now_ns) noexcept;
   void fail(DriveProblem problem, std::int64_t now_ns) noexcept;
+  void blame_step(const char* remedy) noexcept;
   void heartbeat(NmtState state, std::int64_t now_ns) noexcept;
   void finish_exchange(std::int64_t now_ns) noexcept;
   [[nodiscard]] const SetupStep& step() const noexcept { return setup_.step[step_]; }
