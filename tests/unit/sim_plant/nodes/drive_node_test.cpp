@@ -156,7 +156,7 @@ TEST_F(DriveNodeTest, TellsPositionTorqueAndStatuswordAtTheSync) {
 
 TEST_F(DriveNodeTest, EncoderCountsWrapAtThirtyTwoBits) {
   configure();
-  node.set_shaft(2 * std::numbers::pi * (std::pow(2.0, 31) / 16000.0) - 0.1, 0);
+  node.set_shaft(2 * std::numbers::pi * (std::pow(2.0, 31) / 16000.0) - 1.0, 0);  // 2546 counts short of it, offset 500
   const std::int32_t high = node.position_counts();
   EXPECT_GT(high, 0);
   node.set_shaft(2 * std::numbers::pi * (std::pow(2.0, 31) / 16000.0) + 0.1, 0);
