@@ -355,6 +355,42 @@ TEST_F(RigLinkTest, NextControllerTakesOverFromOneThatDied) {
   EXPECT_TRUE(enabled()) << next.bring_up_step();
 }
 
+// A bus that plays back what it is given: error reports never travel on a wire.
+struct ScriptedBus {
+  bool send(const CanFrame&, std::int64_t) noexcept {
+    ++count.sent;
+    return true;
+  }
+  void flush(std::int64_t) noexcept {}
+  bool receive(CanFrame& frame, std::int64_t) noexcept { return arrived.pop(frame); }
+  [[nodiscard]] const BusCounters& counters() const noexcept { return count; }
+  [[nodiscard]] int file_descriptor() const noexcept { return -1; }
+  Fifo<CanFrame, 4> arrived;
+  BusCounters count;
+};
+
+TEST(RigLink, IsDownAndSilentOnceItsControllerIsOffTheBus) {
+  ScriptedBus drives;
+  ScriptedBus sensor;
+  RigLink<ScriptedBus> link{make_test_rig(), drives, sensor};
+  link.begin_tick(0);
+  CanFrame report{.id = 0x04, .length = 8};  // controller warning: noted, no more
+  report.error = true;
+  ASSERT_TRUE(drives.arrived.push(report));
+  link.poll(0);
+  EXPECT_EQ(link.feedback().state, LinkState::BringUp);
+  report.id = error_class_bus_off;
+  ASSERT_TRUE(drives.arrived.push(report));
+  link.poll(0);
+  link.begin_tick(1'000'000);
+  EXPECT_EQ(link.feedback().state, LinkState::Down);
+  const std::uint64_t sent = drives.count.sent;
+  link.end_tick(1'500'000, {.request = DriveRequest::Enable});
+  link.begin_tick(2'000'000);
+  EXPECT_EQ(drives.count.sent, sent);
+  EXPECT_NE(std::string{link.bring_up_step()}.find("off the bus"), std::string::npos);
+}
+
 TEST_F(RigLinkTest, SameInputsGiveTheSameBusTraffic) {
   const auto trace = [] {
     WiredRig rig;
