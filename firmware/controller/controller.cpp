@@ -1,0 +1,544 @@
+#include "firmware/controller/controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "common/mechanism/redundancy.hpp"
+
+namespace trocar::controller {
+
+using mechanism::Vec3;
+using mechanism::Vec4;
+using safety::Trigger;
+
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t ns_per_ms = 1'000'000;
+constexpr std::int64_t enable_timeout_ns = 1000 * ns_per_ms;  // a drive walks its CiA 402 states in a few tens of ms
+constexpr std::uint32_t rest_ticks_needed = 50;
+constexpr std::int32_t rest_counts = 2;                       // encoder flicker that still counts as rest
+constexpr std::uint32_t tare_ticks = 250;                     // 12.5 mN of sensor noise average to 0.8 mN
+constexpr std::size_t commands_per_tick = 4;
+constexpr int path_checks = 16;
+constexpr double velocity_bandwidth_rad_s = 300.0;            // one count of 40 um disturbs the velocity by 4 mm/s
+constexpr double longest_step_s = 0.005;                      // after a stall the reference goes on slowly instead of jumping
+constexpr double jump_factor = 4.0;                           // motion per tick beyond this many times the velocity fault is no motion
+constexpr double friction_smoothing_rad_s = 0.01;             // joint speed at which the fed-forward Coulomb friction is at 76 %
+
+}  // namespace
+
+Controller::Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time) noexcept
+    : rig_(rig),
+      mail_(mail),
+      late_limit_ns_(1000 * static_cast<std::int64_t>(real_time ? rig.timing.late_tick_us : rig.timing.late_tick_best_effort_us)),
+      host_(static_cast<std::int64_t>(rig.timing.host_timeout_ms) * ns_per_ms),
+      enabling_(enable_timeout_ns) {}
+
+const hal::LinkCommand& Controller::tick(const TickInput& input) noexcept {
+  acquire(input);
+  observe();
+  take_commands();
+  supervise(input);
+  control();
+  limit_and_send();
+  follow_up();
+  record(input);
+  return command_;
+}
+
+void Controller::acquire(const TickInput& input) noexcept {
+  const double nominal_s = 1.0 / rig_.timing.tick_hz;
+  dt_s_ = started_ ? std::clamp(1e-9 * static_cast<double>(input.now_ns - now_ns_), 0.1 * nominal_s, longest_step_s) : nominal_s;
+  started_ = true;
+  now_ns_ = input.now_ns;
+  ++tick_;
+  link_ = *input.link;
+
+  if (link_.complete) {
+    gap_ticks_ = missed_feedback_ + 1;
+    missed_feedback_ = 0;
+    bool still = true;
+    for (std::size_t i = 0; i < rig_.drives(); ++i) {
+      counts_[i] = link_.drive[i].position_counts;
+      still = still && std::abs(counts_[i] - rest_counts_[i]) <= rest_counts;
+    }
+    if (still) {
+      if (rest_ticks_ < rest_ticks_needed) ++rest_ticks_;
+    } else {
+      rest_counts_ = counts_;
+      rest_ticks_ = 0;
+    }
+  } else {
+    ++missed_feedback_;
+    ++ticks_without_feedback_;
+  }
+  missed_sensor_ = link_.sensor.fresh ? 0 : missed_sensor_ + 1;
+  if (input.wakeup_late_ns > late_limit_ns_) ++ticks_late_;
+}
+
+void Controller::observe() noexcept {
+  if (!homed_) {
+    pose_valid_ = false;
+    return;
+  }
+  // Between encoder values the last pose stands; the velocity observer decays it to rest rather than guessing on.
+  if (link_.complete) {
+    const double rad_per_count = 2.0 * std::numbers::pi / rig_.actuation.encoder_counts_per_turn;
+    for (std::size_t i = 0; i < rig_.drives(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      joint_rad_[k] = joint_offset_[k] + rad_per_count * counts_[i];
+    }
+    const Vec3 before = state_.x;
+    const bool had_pose = pose_valid_;
+    pose_valid_ = mechanism::forward(rig_.twin, joint_rad_, state_.x[2], state_) == mechanism::Status::Ok &&
+                  mechanism::velocity_map(rig_.twin, state_, joint_map_) == mechanism::Status::Ok;
+    pose_jump_m_ = had_pose && pose_valid_ ? std::hypot(state_.x[0] - before[0], state_.x[1] - before[1]) : 0.0;
+    singularity_ = pose_valid_ ? mechanism::singularity_distance(rig_.twin, state_) : 0.0;
+  }
+  if (pose_valid_) {
+    const control::VelocityObserverConfig config{velocity_bandwidth_rad_s};
+    for (Eigen::Index i = 0; i < 3; ++i) velocity_[i] = control::update(config, velocity_observer_[static_cast<std::size_t>(i)], state_.x[i], dt_s_);
+  }
+  observe_force();
+}
+
+// The sensor sits at the needle base and turns with it; it measures what the base applies to the needle.
+void Controller::observe_force() noexcept {
+  if (link_.sensor.fresh) {
+    const double c = std::cos(rig_.sensor.angle_rad);
+    const double s = std::sin(rig_.sensor.angle_rad);
+    const auto& f = link_.sensor.force_torque;
+    sensor_wrench_ = {c * f[0] - s * f[1], s * f[0] + c * f[1], f[5]};
+  }
+  const Vec3 w = sensor_wrench_ - tare_;
+  const double c = std::cos(state_.x[2]);
+  const double s = std::sin(state_.x[2]);
+  base_wrench_ = {c * w[0] - s * w[1], s * w[0] + c * w[1], w[2]};
+}
+
+void Controller::take_commands() noexcept {
+  Command command;
+  for (std::size_t i = 0; i < commands_per_tick && mail_.commands.pop(command); ++i) execute(command);
+}
+
+void Controller::execute(const Command& command) noexcept {
+  if (session_ != 0 && command.session == session_) host_.feed(now_ns_);
+  const bool mine = command.session != 0 && command.session == session_;
+  ReplyCode code = ReplyCode::Accepted;
+  switch (command.kind) {
+    case CommandKind::KeepAlive: return;  // answered by silence: it comes fifty times a second
+    case CommandKind::Stop:
+      if (position_controlled() && fault_ == Fault::None) {
+        motion_end_ = ReplyCode::Stopped;
+        motion_.brake(rig_.limits);
+        stopping_ = true;
+      } else if (fault_ == Fault::None) {
+        arm_command_ = {};
+        raise(Trigger::TorqueOffAsked);
+      }
+      code = ReplyCode::Done;
+      break;
+    case CommandKind::Hold:
+      code = safety::has_torque(mode_) ? ReplyCode::Done : ReplyCode::WrongMode;
+      if (safety::has_torque(mode_)) hold_here();
+      break;
+    case CommandKind::Home: code = session_ != 0 && !mine ? ReplyCode::SessionTaken : home(); break;
+    case CommandKind::Tare:
+      if (session_ != 0 && !mine) {
+        code = ReplyCode::SessionTaken;
+      } else if (!homed_) {
+        code = ReplyCode::NotHomed;
+      } else if (tare_ticks_ != 0 || mode_ == Mode::Off || mode_ == Mode::Fault) {
+        code = ReplyCode::WrongMode;
+      } else if (motion_.moving()) {
+        code = ReplyCode::NotAtRest;
+      } else {
+        tare_command_ = command;
+        tare_ticks_ = tare_ticks;
+        tare_sum_.setZero();
+      }
+      break;
+    case CommandKind::Arm: code = arm(command); break;
+    case CommandKind::Disarm:
+      if (!mine) {
+        code = session_ != 0 ? ReplyCode::SessionTaken : ReplyCode::NoSession;
+      } else if (motion_.moving()) {
+        code = ReplyCode::NotAtRest;
+      } else {
+        if (safety::has_torque(mode_)) raise(Trigger::TorqueOffAsked);
+        forget_session();
+        code = ReplyCode::Done;
+      }
+      break;
+    case CommandKind::Move: code = move(command); break;
+    case CommandKind::SelectGains:
+      if (session_ != 0 && !mine) {
+        code = ReplyCode::SessionTaken;
+      } else if (command.gain_set >= rig_.gain_sets) {
+        code = ReplyCode::UnknownGains;
+      } else if (motion_.moving()) {
+        code = ReplyCode::NotAtRest;
+      } else {
+        gain_set_ = command.gain_set;
+        code = ReplyCode::Done;
+      }
+      break;
+    case CommandKind::ResetFault: code = session_ != 0 && !mine ? ReplyCode::SessionTaken : reset_fault(); break;
+    default: code = ReplyCode::WrongVersion; break;
+  }
+  reply(command.session, command.id, command.kind, code);
+}
+
+ReplyCode Controller::home() noexcept {
+  if (mode_ != Mode::Ready || arm_command_.session != 0) return ReplyCode::WrongMode;
+  if (!link_.complete || rest_ticks_ < rest_ticks_needed) return ReplyCode::NotAtRest;
+  const Vec3 pose(rig_.homing_pose[0], rig_.homing_pose[1], rig_.homing_pose[2]);
+  // The working mode of the linkage decides between the inverse's branches, so any starting angles will do.
+  Vec4 joints;
+  if (mechanism::inverse(rig_.twin, pose, Vec4::Zero(), joints) != mechanism::Status::Ok) return ReplyCode::UnreachablePose;
+  const double rad_per_count = 2.0 * std::numbers::pi / rig_.actuation.encoder_counts_per_turn;
+  for (std::size_t i = 0; i < rig_.drives(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    joint_offset_[k] = joints[k] - rad_per_count * counts_[i];
+  }
+  state_.x = pose;
+  velocity_observer_ = {};
+  homed_ = true;
+  pose_valid_ = false;
+  tared_ = false;
+  tare_.setZero();
+  observe();
+  announce(EventKind::Homed, mode_, mode_);
+  return ReplyCode::Done;
+}
+
+ReplyCode Controller::arm(const Command& command) noexcept {
+  if (command.session == 0) return ReplyCode::NoSession;
+  if (session_ != 0 && command.session != session_) return ReplyCode::SessionTaken;
+  if (mode_ == Mode::Hold && !stopping_) {  // the former commander is gone; take over where the handle stands
+    session_ = command.session;
+    host_.feed(now_ns_);
+    announce(EventKind::SessionTaken, mode_, mode_);
+    return ReplyCode::Done;
+  }
+  if (mode_ != Mode::Ready || arm_command_.session != 0) return ReplyCode::WrongMode;
+  if (!homed_) return ReplyCode::NotHomed;
+  if (rest_ticks_ < rest_ticks_needed || !pose_valid_) return ReplyCode::NotAtRest;
+  session_ = command.session;
+  host_.feed(now_ns_);
+  arm_command_ = command;
+  enabling_.feed(now_ns_);
+  announce(EventKind::SessionTaken, mode_, mode_);
+  return ReplyCode::Accepted;
+}
+
+ReplyCode Controller::move(const Command& command) noexcept {
+  if (command.session == 0 || session_ == 0) return ReplyCode::NoSession;
+  if (command.session != session_) return ReplyCode::SessionTaken;
+  if ((mode_ != Mode::Armed && mode_ != Mode::Position && mode_ != Mode::Hold) || stopping_) return ReplyCode::WrongMode;
+  if (motion_.moving() || tare_ticks_ != 0) return ReplyCode::NotAtRest;
+  const Vec3 target(command.target_pose[0], command.target_pose[1], command.target_pose[2]);
+  const auto& l = rig_.limits;
+  const auto inside = [&](double x, double y) noexcept {
+    return x >= l.workspace_x_m[0] && x <= l.workspace_x_m[1] && y >= l.workspace_y_m[0] && y <= l.workspace_y_m[1];
+  };
+  if (!target.allFinite() || !inside(target[0], target[1]) || !std::isfinite(command.speed_m_s) || command.speed_m_s <= 0.0 ||
+      !std::isfinite(command.angular_speed_rad_s) || command.angular_speed_rad_s <= 0.0 || !std::isfinite(command.stop_force_n) ||
+      command.stop_force_n < 0.0)
+    return ReplyCode::OutOfRange;
+  // A torque-free handle may have been moved by hand: the reference starts where it is.
+  const Vec3 from = mode_ == Mode::Armed ? state_.x : motion_.reference().pose;
+  if (!path_is_reachable(from, target)) return ReplyCode::UnreachablePose;
+  if (mode_ == Mode::Armed) {
+    motion_.rest(state_.x);
+    pid_ = {};
+  }
+  motion_.start(target, command.speed_m_s, command.angular_speed_rad_s, l);
+  motion_command_ = command;
+  motion_end_ = ReplyCode::Done;
+  last_move_id_ = command.id;
+  raise(Trigger::MoveAccepted);
+  return ReplyCode::Accepted;
+}
+
+bool Controller::path_is_reachable(const Vec3& from, const Vec3& to) noexcept {
+  mechanism::TwinState at;
+  Vec4 near = joint_rad_;
+  for (int i = 0; i <= path_checks; ++i) {
+    const Vec3 x = from + (to - from) * (static_cast<double>(i) / path_checks);
+    if (mechanism::at_pose(rig_.twin, x, near, at) != mechanism::Status::Ok) return false;
+    if (mechanism::singularity_distance(rig_.twin, at) < rig_.limits.singularity) return false;
+    near = at.q;
+  }
+  return true;
+}
+
+ReplyCode Controller::reset_fault() noexcept {
+  if (mode_ != Mode::Fault) return ReplyCode::WrongMode;
+  // A drive keeps its fault until it is reset from here; everything else has to be gone already.
+  if (link_.state != hal::LinkState::Operational || !link_.complete) return ReplyCode::StillFaulty;
+  if (fault_ == Fault::EncoderJump || fault_ == Fault::Inconsistent || fault_ == Fault::FeedbackLost || fault_ == Fault::HeartbeatLost)
+    homed_ = false;  // the counts may no longer mean what they meant
+  announce(EventKind::FaultCleared, mode_, Mode::Off);
+  fault_ = Fault::None;
+  stopping_ = false;
+  reset_drives_ = true;
+  forget_session();
+  raise(Trigger::FaultReset);
+  return ReplyCode::Done;
+}
+
+// Replies that come later than their command.
+void Controller::follow_up() noexcept {
+  if (tare_ticks_ != 0) {
+    tare_sum_ += sensor_wrench_;
+    if (missed_sensor_ > rig_.timing.missed_sensor_ticks || motion_.moving()) {
+      tare_ticks_ = 0;
+      reply(tare_command_.session, tare_command_.id, CommandKind::Tare, ReplyCode::Stopped);
+    } else if (--tare_ticks_ == 0) {
+      tare_ = tare_sum_ / static_cast<double>(tare_ticks);
+      tared_ = true;
+      announce(EventKind::Tared, mode_, mode_, tare_.head<2>().norm());
+      reply(tare_command_.session, tare_command_.id, CommandKind::Tare, ReplyCode::Done);
+    }
+  }
+  if (motion_command_.kind == CommandKind::Move) {
+    if (motion_command_.stop_force_n > 0.0 && motion_.moving() && base_wrench_.head<2>().norm() > motion_command_.stop_force_n) {
+      motion_command_.stop_force_n = 0.0;
+      motion_end_ = ReplyCode::Stopped;
+      motion_.brake(rig_.limits);
+    }
+    if (!motion_.moving()) end_motion(motion_end_);
+  }
+  if (stopping_ && !motion_.moving()) {
+    stopping_ = false;
+    if (fault_ == Fault::None) {
+      raise(Trigger::TorqueOffAsked);
+      forget_session();
+    }
+  }
+}
+
+void Controller::check(bool violated, Fault fault, double value, double limit) noexcept {
+  if (violated && fault_ == Fault::None) latch(fault, value, limit);
+}
+
+void Controller::supervise(const TickInput& input) noexcept {
+  const bool operational = link_.state == hal::LinkState::Operational;
+  if (mode_ == Mode::Off && operational && link_.complete) raise(Trigger::LinkUp);
+  if (mode_ == Mode::Ready && arm_command_.session == 0 && (!operational || missed_feedback_ > rig_.timing.missed_feedback_ticks)) {
+    homed_ = false;  // the drives may have lost their counts with their power
+    raise(Trigger::LinkDown);
+  }
+
+  bool all_enabled = true;
+  for (std::size_t i = 0; i < rig_.drives(); ++i) all_enabled = all_enabled && link_.drive[i].enabled;
+  if (arm_command_.session != 0 && mode_ == Mode::Ready) {
+    if (all_enabled) {
+      motion_.rest(state_.x);
+      pid_ = {};
+      gate_.last_nm = {};
+      raise(Trigger::TorqueEnabled);
+      reply(arm_command_.session, arm_command_.id, CommandKind::Arm, ReplyCode::Done);
+      arm_command_ = {};
+    } else {
+      check(enabling_.expired(now_ns_) || !operational, Fault::DriveFault, 1e-9 * static_cast<double>(enabling_.age_ns(now_ns_)),
+            1e-9 * static_cast<double>(enable_timeout_ns));
+    }
+    return;
+  }
+  if (!safety::has_torque(mode_)) return;
+
+  const auto& l = rig_.limits;
+  check(missed_feedback_ > rig_.timing.missed_feedback_ticks, Fault::FeedbackLost, missed_feedback_, rig_.timing.missed_feedback_ticks);
+  for (std::size_t i = 0; i < rig_.drives(); ++i) {
+    const auto& drive = link_.drive[i];
+    check(!drive.heartbeat_ok, Fault::HeartbeatLost, static_cast<double>(i + 1), 0.0);
+    check(drive.faulted || (drive.fresh && !drive.enabled), Fault::DriveFault, drive.emcy_code, 0.0);
+  }
+  check(!operational, Fault::DriveFault, 0.0, 0.0);
+  check(input.wakeup_late_ns > late_limit_ns_, Fault::LateTick, 1e-3 * static_cast<double>(input.wakeup_late_ns),
+        1e-3 * static_cast<double>(late_limit_ns_));
+  check(!state_.x.allFinite() || !velocity_.allFinite() || !base_wrench_.allFinite(), Fault::NotFinite, 0.0, 0.0);
+  if (link_.complete) {
+    const double jump = jump_factor * l.fault_speed_m_s * dt_s_ * gap_ticks_;
+    check(!pose_valid_ || pose_jump_m_ > jump, Fault::EncoderJump, pose_jump_m_, jump);
+    check(std::abs(state_.residual_m) > l.residual_m, Fault::Inconsistent, state_.residual_m, l.residual_m);
+    check(singularity_ < l.singularity, Fault::Singular, singularity_, l.singularity);
+  }
+  const double speed = velocity_.head<2>().norm();
+  check(speed > l.fault_speed_m_s, Fault::VelocityLimit, speed, l.fault_speed_m_s);
+  check(std::abs(velocity_[2]) > l.fault_angular_speed_rad_s, Fault::VelocityLimit, velocity_[2], l.fault_angular_speed_rad_s);
+  // The reference is never outside; the handle may overshoot by what tracking allows.
+  const double over = std::max({l.workspace_x_m[0] - state_.x[0], state_.x[0] - l.workspace_x_m[1], l.workspace_y_m[0] - state_.x[1],
+                                state_.x[1] - l.workspace_y_m[1]});
+  check(over > l.tracking_m, Fault::WorkspaceLimit, over, l.tracking_m);
+  check(missed_sensor_ > rig_.timing.missed_sensor_ticks, Fault::SensorLost, missed_sensor_, rig_.timing.missed_sensor_ticks);
+  check(link_.sensor.fresh && link_.sensor.saturated, Fault::SensorSaturated, 0.0, 0.0);
+  const double force = base_wrench_.head<2>().norm();
+  check(force > l.fault_force_n, Fault::ForceLimit, force, l.fault_force_n);
+  check(std::abs(base_wrench_[2]) > l.fault_moment_nm, Fault::ForceLimit, base_wrench_[2], l.fault_moment_nm);
+  if (position_controlled()) {
+    const Vec3 e = motion_.reference().pose - state_.x;
+    check(e.head<2>().norm() > l.tracking_m, Fault::TrackingError, e.head<2>().norm(), l.tracking_m);
+    check(std::abs(e[2]) > l.tracking_rad, Fault::TrackingError, e[2], l.tracking_rad);
+  }
+  if (fault_ == Fault::None && session_ != 0 && host_.expired(now_ns_)) {
+    announce(EventKind::HostLost, mode_, mode_, 1e-9 * static_cast<double>(host_.age_ns(now_ns_)), 1e-3 * rig_.timing.host_timeout_ms);
+    hold_here();
+    forget_session();
+  }
+}
+
+bool Controller::position_controlled() const noexcept {
+  if (mode_ == Mode::Position || mode_ == Mode::Hold) return true;
+  return mode_ == Mode::Fault && (safety::row(fault_).reaction == safety::Reaction::Hold ||
+                                  (safety::row(fault_).reaction == safety::Reaction::QuickStop && stopping_));
+}
+
+void Controller::control() noexcept {
+  wrench_.setZero();
+  command_ = {};
+  command_.reset_faults = reset_drives_;
+  reset_drives_ = false;
+  if (!position_controlled() || !pose_valid_) {
+    if (mode_ == Mode::Armed || arm_command_.session != 0) command_.request = hal::DriveRequest::Enable;
+    gate_.last_nm = {};
+    return;
+  }
+  command_.request = hal::DriveRequest::Enable;
+  const control::Reference& reference = motion_.update(dt_s_);
+  const rig::GainSet& gains = rig_.gain_set[gain_set_];
+  const Vec3 error = reference.pose - state_.x;
+  const Vec3 error_rate = reference.velocity - velocity_;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const rig::AxisGains& g = i < 2 ? gains.translation : gains.rotation;
+    const double limit = i < 2 ? rig_.limits.command_force_n : rig_.limits.command_moment_nm;
+    wrench_[i] = control::update(g, pid_[static_cast<std::size_t>(i)], error[i], error_rate[i], limit, dt_s_);
+  }
+  Vec4 friction = Vec4::Zero();
+  if (gains.feed_forward) {
+    mechanism::Mat3 M;
+    mechanism::Mat3 C;
+    if (mechanism::dynamics(rig_.twin, state_, reference.velocity, M, C) == mechanism::Status::Ok)
+      wrench_ += M * reference.acceleration + C * reference.velocity;
+    const Vec4 joint_speed = joint_map_ * reference.velocity;
+    for (Eigen::Index i = 0; i < 4; ++i)
+      friction[i] = rig_.actuation.friction_coulomb_nm * std::tanh(joint_speed[i] / friction_smoothing_rad_s) +
+                    rig_.actuation.friction_viscous_nm_s * joint_speed[i];
+  }
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double limit = i < 2 ? rig_.limits.command_force_n : rig_.limits.command_moment_nm;
+    if (std::isfinite(wrench_[i])) wrench_[i] = std::clamp(wrench_[i], -limit, limit);
+  }
+  Vec4 gear;
+  for (std::size_t i = 0; i < 4; ++i) gear[static_cast<Eigen::Index>(i)] = rig_.actuation.gear_ratio[i];
+  const Vec4 torque = gear.cwiseProduct(mechanism::actuator_torque(joint_map_, gear, wrench_)) + friction;
+  for (std::size_t i = 0; i < 4; ++i) command_.joint_torque_nm[i] = torque[static_cast<Eigen::Index>(i)];
+}
+
+void Controller::limit_and_send() noexcept {
+  if (command_.request != hal::DriveRequest::Enable) return;
+  safety::JointTorques allowed{};
+  if (!safety::pass(rig_, gate_, command_.joint_torque_nm, dt_s_, allowed)) {
+    check(true, Fault::NotFinite, 0.0, 0.0);
+    command_.request = hal::DriveRequest::Disable;
+  }
+  command_.joint_torque_nm = allowed;
+}
+
+void Controller::record(const TickInput& input) noexcept {
+  Sample& s = sample_;
+  s.tick = tick_;
+  s.time_ns = now_ns_;
+  s.mode = mode_;
+  s.fault = fault_;
+  s.moving = motion_.moving() ? 1 : 0;
+  s.gain_set = gain_set_;
+  s.command_id = last_move_id_;
+  s.position_counts = counts_;
+  s.joint_torque_command_nm = command_.joint_torque_nm;
+  for (std::size_t i = 0; i < capacity::drives; ++i) s.joint_torque_measured_nm[i] = link_.drive[i].joint_torque_nm;
+  const bool setpoint = position_controlled();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    s.pose[i] = homed_ ? state_.x[k] : nan;
+    s.velocity[i] = homed_ ? velocity_[k] : nan;
+    s.setpoint_pose[i] = setpoint ? motion_.reference().pose[k] : nan;
+    s.setpoint_velocity[i] = setpoint ? motion_.reference().velocity[k] : nan;
+    s.wrench_command[i] = wrench_[k];
+    s.base_wrench[i] = homed_ ? base_wrench_[k] : nan;
+  }
+  s.residual_m = homed_ ? state_.residual_m : nan;
+  s.singularity = homed_ ? singularity_ : nan;
+  s.missed_feedback = missed_feedback_;
+  s.wakeup_late_us = static_cast<float>(1e-3 * static_cast<double>(input.wakeup_late_ns));
+  s.tick_us = 0.0F;
+}
+
+Status Controller::status() const noexcept {
+  return {mode_, fault_, homed_, tared_, session_, tick_, ticks_late_, ticks_without_feedback_, gain_set_};
+}
+
+void Controller::raise(Trigger trigger) noexcept {
+  const auto to = safety::next(mode_, trigger);
+  if (!to) return;
+  const Mode from = mode_;
+  mode_ = *to;
+  if (from != mode_) announce(EventKind::ModeChanged, from, mode_);
+}
+
+void Controller::latch(Fault fault, double value, double limit) noexcept {
+  fault_ = fault;
+  const Mode from = mode_;
+  const bool controlled = position_controlled();
+  raise(Trigger::FaultRaised);
+  announce(EventKind::FaultLatched, from, mode_, value, limit);
+  arm_command_ = {};
+  tare_ticks_ = 0;
+  const auto reaction = safety::row(fault).reaction;
+  motion_end_ = ReplyCode::Stopped;
+  if (reaction == safety::Reaction::TorqueOff) {
+    motion_.rest(state_.x);
+  } else if (controlled || from == Mode::Position || from == Mode::Hold) {
+    motion_.brake(rig_.limits);
+  } else {
+    motion_.rest(state_.x);
+    pid_ = {};
+  }
+  stopping_ = reaction == safety::Reaction::QuickStop;
+}
+
+void Controller::hold_here() noexcept {
+  if (mode_ == Mode::Armed) {
+    motion_.rest(state_.x);
+    pid_ = {};
+  }
+  motion_end_ = ReplyCode::Stopped;
+  motion_.brake(rig_.limits);
+  raise(Trigger::HoldAsked);
+}
+
+void Controller::forget_session() noexcept {
+  if (session_ != 0) announce(EventKind::SessionReleased, mode_, mode_);
+  session_ = 0;
+  arm_command_ = {};
+}
+
+void Controller::end_motion(ReplyCode code) noexcept {
+  reply(motion_command_.session, motion_command_.id, CommandKind::Move, code);
+  motion_command_ = {};
+}
+
+void Controller::reply(std::uint64_t session, std::uint32_t id, CommandKind kind, ReplyCode code) noexcept {
+  mail_.replies.push({session, id, kind, code, mode_, tick_});
+}
+
+void Controller::announce(EventKind kind, Mode from, Mode to, double value, double limit) noexcept {
+  mail_.events.push({tick_, now_ns_, kind, from, to, fault_, value, limit});
+}
+
+}  // namespace trocar::controller
