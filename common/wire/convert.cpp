@@ -1,0 +1,204 @@
+#include "common/wire/convert.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace trocar::wire {
+
+namespace {
+
+template <class To, class From, std::size_t N>
+void copy(To (&to)[N], const std::array<From, N>& from) noexcept {
+  std::copy(from.begin(), from.end(), to);
+}
+template <class To, class From, std::size_t N>
+void copy(std::array<To, N>& to, const From (&from)[N]) noexcept {
+  std::copy(from, from + N, to.begin());
+}
+
+template <std::size_t N>
+std::string_view text_of(const char (&text)[N]) noexcept {
+  return {text, strnlen(text, N)};
+}
+
+constexpr std::uint8_t last_command = static_cast<std::uint8_t>(CommandKind::ResetFault);
+
+}  // namespace
+
+void copy_text(std::span<char> to, std::string_view text) noexcept {
+  if (to.empty()) return;
+  std::size_t size = std::min(text.size(), to.size() - 1);
+  if (size < text.size()) {
+    while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0u) == 0x80u) --size;
+  }
+  std::copy_n(text.begin(), size, to.begin());
+  to[size] = '\0';
+}
+
+Sample to_wire(const trocar::Sample& sample) noexcept {
+  Sample out{};
+  out.tick = sample.tick;
+  out.time_ns = sample.time_ns;
+  out.mode = static_cast<std::uint8_t>(sample.mode);
+  out.fault = static_cast<std::uint8_t>(sample.fault);
+  out.moving = sample.moving;
+  out.gain_set = sample.gain_set;
+  out.command_id = sample.command_id;
+  copy(out.position_counts, sample.position_counts);
+  copy(out.joint_torque_command_nm, sample.joint_torque_command_nm);
+  copy(out.joint_torque_measured_nm, sample.joint_torque_measured_nm);
+  copy(out.pose, sample.pose);
+  copy(out.velocity, sample.velocity);
+  copy(out.setpoint_pose, sample.setpoint_pose);
+  copy(out.setpoint_velocity, sample.setpoint_velocity);
+  copy(out.wrench_command, sample.wrench_command);
+  copy(out.base_wrench, sample.base_wrench);
+  out.residual_m = sample.residual_m;
+  out.singularity = sample.singularity;
+  out.missed_feedback = sample.missed_feedback;
+  out.wakeup_late_us = sample.wakeup_late_us;
+  out.tick_us = sample.tick_us;
+  return out;
+}
+
+trocar::Sample from_wire(const Sample& sample) noexcept {
+  trocar::Sample out{};
+  out.tick = sample.tick;
+  out.time_ns = sample.time_ns;
+  out.mode = static_cast<Mode>(sample.mode);
+  out.fault = static_cast<Fault>(sample.fault);
+  out.moving = sample.moving;
+  out.gain_set = sample.gain_set;
+  out.command_id = sample.command_id;
+  copy(out.position_counts, sample.position_counts);
+  copy(out.joint_torque_command_nm, sample.joint_torque_command_nm);
+  copy(out.joint_torque_measured_nm, sample.joint_torque_measured_nm);
+  copy(out.pose, sample.pose);
+  copy(out.velocity, sample.velocity);
+  copy(out.setpoint_pose, sample.setpoint_pose);
+  copy(out.setpoint_velocity, sample.setpoint_velocity);
+  copy(out.wrench_command, sample.wrench_command);
+  copy(out.base_wrench, sample.base_wrench);
+  out.residual_m = sample.residual_m;
+  out.singularity = sample.singularity;
+  out.missed_feedback = sample.missed_feedback;
+  out.wakeup_late_us = sample.wakeup_late_us;
+  out.tick_us = sample.tick_us;
+  return out;
+}
+
+Event to_wire(const trocar::Event& event, std::string_view text) noexcept {
+  Event out{};
+  out.protocol = protocol_version;
+  out.tick = event.tick;
+  out.time_ns = event.time_ns;
+  out.kind = static_cast<std::uint8_t>(event.kind);
+  out.mode_from = static_cast<std::uint8_t>(event.from);
+  out.mode_to = static_cast<std::uint8_t>(event.to);
+  out.fault = static_cast<std::uint8_t>(event.fault);
+  out.value = event.value;
+  out.limit = event.limit;
+  copy_text(out.text, text);
+  return out;
+}
+
+trocar::Event from_wire(const Event& event) noexcept {
+  trocar::Event out{};
+  out.tick = event.tick;
+  out.time_ns = event.time_ns;
+  out.kind = static_cast<EventKind>(event.kind);
+  out.from = static_cast<Mode>(event.mode_from);
+  out.to = static_cast<Mode>(event.mode_to);
+  out.fault = static_cast<Fault>(event.fault);
+  out.value = event.value;
+  out.limit = event.limit;
+  return out;
+}
+
+Reply to_wire(const trocar::Reply& reply, std::string_view text) noexcept {
+  Reply out{};
+  out.protocol = protocol_version;
+  out.session = reply.session;
+  out.id = reply.id;
+  out.kind = static_cast<std::uint8_t>(reply.kind);
+  out.code = static_cast<std::uint8_t>(reply.code);
+  out.mode = static_cast<std::uint8_t>(reply.mode);
+  out.tick = reply.tick;
+  copy_text(out.text, text);
+  return out;
+}
+
+trocar::Reply from_wire(const Reply& reply) noexcept {
+  trocar::Reply out{};
+  out.session = reply.session;
+  out.id = reply.id;
+  out.kind = static_cast<CommandKind>(reply.kind);
+  out.code = static_cast<ReplyCode>(reply.code);
+  out.mode = static_cast<Mode>(reply.mode);
+  out.tick = reply.tick;
+  return out;
+}
+
+Command to_wire(const trocar::Command& command, std::string_view gain_set, std::int64_t sent_ns, std::uint32_t deadline_ms) noexcept {
+  Command out{};
+  out.protocol = protocol_version;
+  out.session = command.session;
+  out.id = command.id;
+  out.sent_ns = sent_ns;
+  out.deadline_ms = deadline_ms;
+  out.kind = static_cast<std::uint8_t>(command.kind);
+  copy_text(out.gain_set, gain_set);
+  copy(out.target_pose, command.target_pose);
+  out.speed_m_s = command.speed_m_s;
+  out.angular_speed_rad_s = command.angular_speed_rad_s;
+  out.stop_force_n = command.stop_force_n;
+  return out;
+}
+
+ReplyCode from_wire(const Command& command, std::span<const std::string_view> gain_sets, std::int64_t now_ns,
+                    trocar::Command& out) noexcept {
+  if (command.protocol != protocol_version || command.kind > last_command) return ReplyCode::WrongVersion;
+  // Compared without adding, so that a hostile sent_ns cannot overflow.
+  const std::int64_t allowed_ns = std::int64_t{command.deadline_ms} * 1'000'000;
+  if (command.deadline_ms != 0 && command.sent_ns < now_ns - allowed_ns) return ReplyCode::Expired;
+
+  out = {};
+  out.session = command.session;
+  out.id = command.id;
+  out.kind = static_cast<CommandKind>(command.kind);
+  if (out.kind == CommandKind::SelectGains) {
+    const auto found = std::find(gain_sets.begin(), gain_sets.end(), text_of(command.gain_set));
+    if (found == gain_sets.end()) return ReplyCode::UnknownGains;
+    out.gain_set = static_cast<std::uint8_t>(found - gain_sets.begin());
+  }
+  copy(out.target_pose, command.target_pose);
+  out.speed_m_s = command.speed_m_s;
+  out.angular_speed_rad_s = command.angular_speed_rad_s;
+  out.stop_force_n = command.stop_force_n;
+  return ReplyCode::Accepted;
+}
+
+std::string version_problem(std::string_view who, std::uint32_t theirs) {
+  if (theirs == protocol_version) return {};
+  return std::string(who) + " speaks protocol " + std::to_string(theirs) + ", this program " + std::to_string(protocol_version) +
+         ": install the same version of trocar on both sides";
+}
+
+bool BatchBuffer::push(const trocar::Sample& sample) noexcept {
+  if (full()) return false;
+  samples_[size_++] = to_wire(sample);
+  return true;
+}
+
+SampleBatch BatchBuffer::message(std::uint64_t dropped) noexcept {
+  SampleBatch out{};
+  out.protocol = protocol_version;
+  out.dropped = dropped;
+  out.samples._buffer = samples_.data();
+  out.samples._length = static_cast<std::uint32_t>(size_);
+  out.samples._maximum = static_cast<std::uint32_t>(capacity);
+  out.samples._release = false;
+  return out;
+}
+
+}  // namespace trocar::wire

@@ -1,0 +1,32 @@
+// Topic names, types and quality of service: the one place that writer, reader and recorder agree on. No DDS header in here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace trocar::wire {
+
+struct Topic {
+  const char* name;
+  const char* type;  // as in rig.idl
+  bool reliable;
+  bool transient_local;  // a late reader still gets the last `depth` values
+  std::uint32_t depth;   // samples kept per writer and reader; 0 keeps all
+};
+
+// Samples: a lost batch is history, resending would only delay the next; deep, so that a reader may sleep for seconds.
+inline constexpr Topic samples_topic{"rig/samples", "trocar::wire::SampleBatch", false, false, 1024};
+// Status and events: whoever joins late must know the present state and how it came about.
+inline constexpr Topic status_topic{"rig/status", "trocar::wire::Status", true, true, 1};
+inline constexpr Topic events_topic{"rig/events", "trocar::wire::Event", true, true, 256};
+// Commands and replies: every one counts, and none may act on a program that starts later.
+inline constexpr Topic command_topic{"rig/command", "trocar::wire::Command", true, false, 0};
+inline constexpr Topic reply_topic{"rig/reply", "trocar::wire::Reply", true, false, 0};
+
+inline constexpr std::array<Topic, 5> topics{samples_topic, status_topic, events_topic, command_topic, reply_topic};
+
+// The text of rig.idl as this program was built with.
+[[nodiscard]] std::string_view idl_text() noexcept;
+
+}  // namespace trocar::wire
