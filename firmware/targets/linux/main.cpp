@@ -1,0 +1,159 @@
+// trocar-rig: the controller process on the rig controller PC. Start-up may allocate and fail; then the loop below runs the tick
+// once a period until it is told to stop.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "common/config/rig_file.hpp"
+#include "common/config/share.hpp"
+#include "common/config/user_error.hpp"
+#include "firmware/bridge/bridge.hpp"
+#include "firmware/controller/controller.hpp"
+#include "hal/can/endpoint_bus.hpp"
+#include "hal/realtime/clock.hpp"
+#include "hal/realtime/setup.hpp"
+#include "hal/rig_link.hpp"
+
+namespace {
+
+using namespace trocar;
+namespace rt = hal::realtime;
+
+std::atomic<bool> stop_asked{false};
+
+void on_signal(int) { stop_asked.store(true); }
+
+struct Options {
+  std::string rig = "ubc_twin";
+  bool best_effort{};
+  int cpu = -1;
+  int priority = 80;
+  std::int64_t domain = -1;
+};
+
+// Everything of fixed size that the loop uses, in one block that the memory lock covers.
+struct Process {
+  explicit Process(const rig::Rig& r) : rig(r) {}
+  rig::Rig rig;
+  controller::Mailboxes mail;
+  bridge::Shared shared;
+  hal::EndpointBus drives, sensor;
+};
+
+void run_loop(Process& p, controller::Controller& controller) {
+  hal::RigLink<hal::EndpointBus> link(p.rig, p.drives, p.sensor);
+  const auto period_ns = static_cast<std::int64_t>(1e9 / p.rig.timing.tick_hz);
+  const std::int64_t deadline_ns = 1000 * static_cast<std::int64_t>(p.rig.timing.feedback_deadline_us);
+  const std::array<int, 2> inputs{p.drives.file_descriptor(), p.sensor.file_descriptor()};
+  const std::int64_t start_ns = rt::monotonic_now_ns();
+  std::int64_t next_ns = start_ns + period_ns;
+  int until_shutdown = -1;  // ticks left after a stop was asked, so that braking and disabling get their time
+
+  for (std::uint64_t tick = 0; until_shutdown != 0; ++tick) {
+    rt::sleep_until(next_ns);
+    const std::int64_t woke_ns = rt::monotonic_now_ns();
+    link.begin_tick(woke_ns);
+    while (!link.poll(rt::monotonic_now_ns())) {
+      const std::int64_t now = rt::monotonic_now_ns();
+      if (now >= woke_ns + deadline_ns) break;
+      rt::wait_for_input(inputs, woke_ns + deadline_ns);
+    }
+    const std::int64_t begin_ns = rt::monotonic_now_ns();
+    const hal::LinkCommand& command = controller.tick({woke_ns - start_ns, woke_ns - next_ns, &link.feedback()});
+    link.end_tick(rt::monotonic_now_ns(), command);
+    const std::int64_t end_ns = rt::monotonic_now_ns();
+
+    Sample& sample = controller.sample();
+    sample.tick_us = static_cast<float>(1e-3 * static_cast<double>(end_ns - begin_ns));
+    p.mail.samples.push(sample);
+    if (tick % 8 == 0) p.shared.snapshots.push({controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational});
+
+    // A missed period is not made up for by a burst: the schedule moves on.
+    next_ns += period_ns;
+    if (end_ns > next_ns + period_ns) next_ns = end_ns - (end_ns - next_ns) % period_ns + period_ns;
+
+    if (until_shutdown > 0) --until_shutdown;
+    if (until_shutdown < 0 && stop_asked.load(std::memory_order_relaxed)) {
+      p.mail.commands.push({.session = 0, .id = 0, .kind = CommandKind::Stop});
+      until_shutdown = static_cast<int>(0.5 * p.rig.timing.tick_hz);
+    }
+    if (until_shutdown > 1 && !safety::has_torque(controller.status().mode)) until_shutdown = 1;
+  }
+  link.shut_down(rt::monotonic_now_ns());
+}
+
+int run(const Options& options) {
+  const auto path = config::find_share("rigs", options.rig);
+  auto process = std::make_unique<Process>(config::read_rig(path));
+  Process& p = *process;
+  if (options.domain >= 0) p.rig.dds_domain = static_cast<std::uint32_t>(options.domain);
+  if (p.rig.kind != rig::Kind::Twin)
+    throw config::UserError(fmt::format("{}: kind = single: the controller moves a handle in x, y and rotation, which needs a twin; "
+                                        "use ubc_twin, or look at this rig with: trocar rig info {}", path.string(), options.rig));
+  const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
+    const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig);
+    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", path.string(), name, status.message.data()));
+  };
+  open(p.drives, p.rig.buses.drives, "drives");
+  open(p.sensor, p.rig.buses.sensor, "sensor");
+
+  bridge::Bridge bridge(p.rig, p.mail, p.shared);
+  rt::Setup setup;
+  setup.apply({options.priority, options.cpu});
+  std::string missing;
+  for (std::size_t i = 0; i < rt::item_count; ++i) {
+    const auto item = static_cast<rt::Item>(i);
+    const rt::Outcome& outcome = setup.outcome(item);
+    std::array<char, 256> line{};
+    rt::describe(item, outcome, line);
+    if (outcome.asked && !outcome.obtained) fmt::print(stderr, "trocar-rig: {}\n", line.data());
+    if (outcome.asked && !outcome.obtained && item != rt::Item::Kernel) missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
+  }
+  if (!setup.complete() && !options.best_effort)
+    throw config::UserError("the real-time set-up is incomplete (above): run as root or with the capabilities sys_nice and ipc_lock, "
+                            "or add --best-effort when no motor is connected");
+
+  controller::Controller controller(p.rig, p.mail, setup.complete());
+  bridge.report_real_time(setup.complete(), missing);
+  fmt::print("trocar-rig: {} at {:g} Hz, DDS domain {}, {}\n", p.rig.name.data(), p.rig.timing.tick_hz, p.rig.dds_domain,
+             setup.complete() ? "real-time set-up complete" : "best effort");
+  std::fflush(stdout);
+  run_loop(p, controller);
+  fmt::print("trocar-rig: stopped in mode {}\n", to_string(controller.status().mode));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  bool die_with_parent = false;
+  CLI::App app{"trocar-rig: the real-time controller of a rig.\nExample: trocar-rig --rig ubc_twin --best-effort"};
+  app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
+  app.add_option("--domain", options.domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
+  app.add_option("--cpu", options.cpu, "core to run on")->check(CLI::NonNegativeNumber);
+  app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
+  app.add_flag("--best-effort", options.best_effort, "go on when the machine refuses part of the real-time set-up");
+  app.add_flag("--die-with-parent", die_with_parent, "stop orderly when the process that started this one ends");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  if (die_with_parent) prctl(PR_SET_PDEATHSIG, SIGTERM);
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    return run(options);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "trocar-rig: {}\n", e.what());
+    return 1;
+  }
+}
