@@ -144,11 +144,11 @@ std::string_view nearest(std::string_view written, std::span<const std::string_v
   }
   if (written.size() > longest_compared) return {};
   std::string_view best;
-  std::size_t least = std::max<std::size_t>(1, written.size() / 3) + 1;
+  std::size_t least = std::max<std::size_t>(2, written.size() / 3) + 1;  // two: neighbouring letters swapped
   for (const std::string_view candidate : candidates) {
     if (candidate.size() > longest_compared) continue;
     const std::size_t d = distance(written, candidate);
-    if (d < least) {
+    if (d < least && d < std::min(written.size(), candidate.size())) {
       least = d;
       best = candidate;
     }

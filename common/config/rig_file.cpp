@@ -1,12 +1,12 @@
 #include "common/config/rig_file.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "common/config/document.hpp"
 
@@ -242,12 +242,8 @@ rig::BusEndpoint endpoint(const Table& table) {
   if (!udp) table.fail("interface", "missing; add interface = \"can0\", or rig_port = 20011 and plant_port = 20012 for a simulated bus");
   end.rig_port = static_cast<std::uint16_t>(count(table, "rig_port", 1, 65535, "UDP port on which the rig listens, such as 20011"));
   end.plant_port = static_cast<std::uint16_t>(count(table, "plant_port", 1, 65535, "UDP port on which the plant listens, such as 20012"));
-  const std::string host = table.text_or("host", "127.0.0.1", "an IPv4 address, such as \"127.0.0.1\"");
-  in_addr address{};
-  if (host.size() >= end.host.size() || inet_pton(AF_INET, host.c_str(), &address) != 1) {
-    table.fail("host", "not an IPv4 address; write four numbers, such as \"127.0.0.1\"");
-  }
-  std::copy(host.begin(), host.end(), end.host.begin());
+  constexpr std::string_view host_remedy = "an address or a known name, such as \"127.0.0.1\"";
+  end.host = table.has("host") ? name_of<sizeof end.host>(table, "host", host_remedy) : std::array<char, 64>{"127.0.0.1"};
   if (end.rig_port == end.plant_port) table.fail("plant_port", "the same as rig_port; give each side its own");
   return end;
 }
