@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 
 #include "common/config/document.hpp"
+#include "common/mechanism/five_bar.hpp"
+#include "common/mechanism/twin.hpp"
 
 namespace trocar::config {
 namespace {
@@ -17,14 +18,12 @@ using rig::Kind;
 using rig::Rig;
 
 constexpr double turn_rad = 6.283185307179586;
-constexpr double unbounded = std::numeric_limits<double>::max();
 
 // Ranges are what a table-top rig can be, wide enough for any of them and narrow enough that a value in mm or g falls outside.
 constexpr Range length_range{0.005, 2.0};
-constexpr Range mass_range{0.0, 20.0};
-constexpr Range inertia_range{0.0, 1.0};
+constexpr Range mass_range{1e-6, 20.0};  // above 0: the equations of motion divide by inertia
+constexpr Range inertia_range{1e-9, 1.0};
 constexpr Range offset_range{-2.0, 2.0};
-constexpr Range not_negative{0.0, unbounded};
 
 template <std::size_t N>
 std::array<char, N> name_of(const Table& table, std::string_view key, std::string_view remedy) {
@@ -63,8 +62,8 @@ std::array<mechanism::Link, 2> links(const Table& table) {
 
 mechanism::FiveBarModel linkage(const Table& table) {
   mechanism::FiveBarModel model{};
-  model.base_m = table.number("base_m", {0.0, 2.0}, "the distance between the motor axes, such as 0.08");
-  model.end_point_mass_kg = table.number("end_point_mass_kg", mass_range, "the joint hardware at the end point, such as 0.02");
+  model.base_m = table.number("base_m", {0.0, length_range.max}, "the distance between the motor axes, such as 0.08");
+  model.end_point_mass_kg = table.number("end_point_mass_kg", {0.0, mass_range.max}, "the joint hardware at the end point, such as 0.02");
   model.proximal = links(table.table("proximal"));
   model.distal = links(table.table("distal"));
   double sum = 0.0;
@@ -290,6 +289,31 @@ void homing(const Table& table, Rig& rig) {
   const auto inside = [](double value, const std::array<double, 2>& range) { return value >= range[0] && value <= range[1]; };
   if (!inside(rig.homing_pose[0], rig.limits.workspace_x_m) || !inside(rig.homing_pose[1], rig.limits.workspace_y_m)) {
     table.fail("pose", "outside of the box limits.workspace_x_m, limits.workspace_y_m; move the pose or widen the box");
+  }
+  double distance = 0.0;
+  mechanism::Status status{};
+  if (rig.kind == Kind::Twin) {
+    const mechanism::Vec3 pose(rig.homing_pose[0], rig.homing_pose[1], rig.homing_pose[2]);
+    mechanism::TwinState state{};
+    status = mechanism::at_pose(rig.twin, pose, mechanism::Vec4::Zero(), state);
+    if (status == mechanism::Status::Ok) distance = mechanism::singularity_distance(rig.twin, state);
+  } else {
+    if (rig.homing_pose[2] != 0.0) table.fail("pose", "a single linkage has no orientation; the third number is 0");
+    const mechanism::Vec2 end(rig.homing_pose[0], rig.homing_pose[1]);
+    mechanism::Vec2 angles = mechanism::Vec2::Zero();
+    mechanism::FiveBarPose state{};
+    status = mechanism::inverse(rig.twin.linkage[0], end, mechanism::Vec2::Zero(), angles);
+    if (status == mechanism::Status::Ok) status = mechanism::forward(rig.twin.linkage[0], angles, state);
+    if (status == mechanism::Status::Ok) distance = mechanism::singularity_distance(rig.twin.linkage[0], angles, state);
+  }
+  if (status != mechanism::Status::Ok) {
+    table.fail("pose",
+               "the links cannot take this pose with the elbows outward; move it within reach, or correct the lengths in [linkage]");
+  }
+  if (distance < rig.limits.singularity) {
+    table.fail("pose", fmt::format("its distance to singularity is {:.3g}, below limits.singularity = {}; move the pose towards the middle "
+                                   "of the workspace, or lower the limit",
+                                   distance, rig.limits.singularity));
   }
 }
 

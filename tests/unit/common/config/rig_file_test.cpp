@@ -242,5 +242,22 @@ TEST_F(RigFileTest, RefusesAHomingPoseOutsideOfTheWorkspace) {
           {"homing.pose = [0, 0.11]: expected an array of 3 numbers, got 2"});
 }
 
+TEST_F(RigFileTest, RefusesAHomingPoseThatTheLinksCannotTake) {
+  std::string wide = edited(twin_rig, "[0.098, 0.202]", "[-0.5, 0.5]").text;
+  expect_parts(error_of(edited(wide, "[0.0, 0.11, 1.5707963267948966]", "[0.0, 0.4, 1.5]").text, read_rig),
+               {"file.toml:34: homing.pose = [0, 0.4, 1.5]: the links cannot take this pose", "move it within reach"});
+  expect_parts(error_of(edited(wide, "[0.0, 0.11, 1.5707963267948966]", "[0.0, 0.23, 1.5707963267948966]").text, read_rig),
+               {"file.toml:34: homing.pose", "its distance to singularity is 0.", "below limits.singularity = 0.25"});
+}
+
+TEST_F(RigFileTest, KeepsASingleLinkageHomeWithoutOrientation) {
+  std::ifstream file(TROCAR_SHARE "/rigs/five_bar.toml");
+  const std::string text((std::istreambuf_iterator<char>(file)), {});
+  expect_parts(error_of(edited(text, "pose = [0.0, 0.149223285959824, 0.0]", "pose = [0.0, 0.149223285959824, 1.57]").text, read_rig),
+               {"homing.pose", "a single linkage has no orientation; the third number is 0"});
+  expect_parts(error_of(edited(text, "pose = [0.0, 0.149223285959824, 0.0]", "pose = [0.0, -0.1, 0.0]").text, read_rig),
+               {"outside of the box"});
+}
+
 }  // namespace
 }  // namespace trocar::config
