@@ -1,0 +1,24 @@
+// rig.toml -> rig::Rig. Every key is required unless it says "or" below; lengths in m, angles in rad, and so on (the name says it).
+//
+//   name, kind = "twin" | "single", dds_domain (or 0)
+//   [linkage] base_m, end_point_mass_kg;  [linkage.proximal], [linkage.distal]: length_m, mass_kg, com_m, inertia_kg_m2, each [left, right]
+//   [coupling] (twin only) length_m, handle_m, handle_mass_kg, handle_com_m, handle_inertia_kg_m2
+//   [actuation], [limits], [timing], [force_sensor]: the members of the structs of the same name in common/rig/rig.hpp
+//   [homing] pose = [x_m, y_m, theta_rad]
+//   [[gains]] name, feed_forward, translation, rotation = { proportional, integral, derivative }; the first is the default
+//   [buses] bitrate_bps, drive_node, master_node, sensor_base_id;  [buses.drives], [buses.sensor]: interface, or rig_port and plant_port
+//   (and host)
+//
+// Refused with file, line, key and remedy: everything that document.hpp refuses, and what contradicts itself or cannot be built
+// (linkages that do not close, a homing pose out of reach, limits in the wrong order, addresses given twice, …).
+#pragma once
+
+#include <filesystem>
+
+#include "common/rig/rig.hpp"
+
+namespace trocar::config {
+
+[[nodiscard]] rig::Rig read_rig(const std::filesystem::path& file);
+
+}  // namespace trocar::config
