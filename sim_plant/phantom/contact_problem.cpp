@@ -142,19 +142,23 @@ bool ContactProblem::solve_free(std::span<const ContactInput> input, ContactSolu
     fresh = true;
   }
   evaluate(input);
+  // Forces of giganewtons (thresholds that stand for "never slips") have no nano-newtons in a double.
+  double largest = 0.0;
+  for (std::size_t i = 0; i < size_; ++i) largest = std::max(largest, std::abs(contact_[i].axial_n));
+  const double tolerance = std::max(0.1 * tolerance_n, 1e-12 * largest);
   double residual = free_residual();
-  for (int k = 0; k < max_corrections && !(residual <= 0.1 * tolerance_n); ++k) {
+  for (int k = 0; k < max_corrections && !(residual <= tolerance); ++k) {
     correct();
     evaluate(input);
     const double next = free_residual();
-    if (!(next < 0.1 * residual) && next > 0.1 * tolerance_n && !fresh) {
+    if (!(next < 0.1 * residual) && next > tolerance && !fresh) {
       if (!factorise(input)) return false;
       ++solution.factorisations;
       fresh = true;
     }
     residual = next;
   }
-  return residual <= 0.1 * tolerance_n;
+  return residual <= tolerance;
 }
 
 // Changes the state of axial unknowns that break their condition (of the last one only, or of all); returns how many break it.

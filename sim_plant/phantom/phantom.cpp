@@ -11,8 +11,8 @@ namespace trocar::sim_plant {
 namespace {
 
 constexpr double speed_filter_s = 0.020;
-// A[rows x rows] of 5000 unknowns takes 200 MB; finer tissue needs columns for a corridor only.
-constexpr Eigen::Index most_unknowns = 5000;
+// A with 5000 unknowns takes 200 MB; finer tissue needs columns for a corridor only.
+constexpr int most_unknowns = 5000;
 
 void require(bool holds, const std::string& message) {
   if (!holds) throw fem::Error(message);
@@ -39,6 +39,10 @@ const PhantomConfig& checked(const PhantomConfig& config) {
                   std::to_string(i + 1) + ")");
   }
   (void)fem::structured_grid(config.tissue.grid);
+  const int unknowns = 2 * config.tissue.grid.nodes[0] * config.tissue.grid.nodes[1];
+  require(unknowns <= most_unknowns, "tissue: " + std::to_string(unknowns) +
+                                         " unknowns; this phantom stores the whole compliance, so at most " +
+                                         std::to_string(most_unknowns) + " (50 x 50 nodes)");
   return config;
 }
 
@@ -78,8 +82,6 @@ Phantom::Phantom(const PhantomConfig& config)
   const fem::Mesh mesh = fem::structured_grid(config_.tissue.grid);
   const fem::Statics statics(mesh, config_.tissue);
   const Eigen::Index rows = statics.degrees_of_freedom();
-  require(rows <= most_unknowns, "tissue: " + std::to_string(rows) + " unknowns; this phantom stores the whole compliance, so at most " +
-                                     std::to_string(most_unknowns) + " (49 x 49 nodes)");
   std::vector<Eigen::Index> all(static_cast<std::size_t>(rows));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Eigen::Index>(i);
   const Eigen::MatrixXd a = fem::compliance_columns(statics, all);
@@ -197,7 +199,7 @@ void Phantom::solve_contacts() noexcept {
 
 // Newton on X + u(X) = tip from the last X, with the gradient of the element in which X lies.
 void Phantom::find_tip() noexcept {
-  constexpr int most_iterations = 20;
+  constexpr int most_iterations = 30;
   constexpr double tolerance_m = 1e-12;
   const fem::Point tip = along(base_, axis_, config_.needle.length_m);
   std::array<fem::Point, 4> nodes{};
@@ -217,8 +219,11 @@ void Phantom::find_tip() noexcept {
     const bool usable = determinant > 0.05;
     const fem::Point step =
         usable ? fem::Point{(j[3] * rest[0] - j[1] * rest[1]) / determinant, (j[0] * rest[1] - j[2] * rest[0]) / determinant} : rest;
-    tip_material_ = along(tip_material_, step, 1.0);
+    const double length = std::hypot(step[0], step[1]);
+    tip_material_ = along(tip_material_, step, length > spacing_m_ ? spacing_m_ / length : 1.0);
   }
+  // Tissue torn out of all proportion by a jump of the base: the tip counts as where it is in space, and what it left is dropped.
+  tip_material_ = tip;
   ++counters_.unconverged;
 }
 
