@@ -49,10 +49,10 @@ class RigClient {
   void keep_alive();  // at most every 10 ms; call it often while armed
 
   struct Handlers {
-    std::function<void(const Sample&)> sample;
-    std::function<void(const RigReply&)> reply;
-    std::function<void(const RigEvent&)> event;
-    std::function<void(const RigStatus&)> status;
+    std::function<void(const Sample&)> sample{};
+    std::function<void(const RigReply&)> reply{};
+    std::function<void(const RigEvent&)> event{};
+    std::function<void(const RigStatus&)> status{};
   };
   // Waits up to timeout_s for something to arrive, then hands out all that is there.
   void poll(double timeout_s, const Handlers& handlers);
