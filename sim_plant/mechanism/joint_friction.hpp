@@ -1,0 +1,34 @@
+// Friction of one joint: Coulomb with a stick phase, as a bristle that bends and slides (Dahl 1968; with damping of the bristle as
+// in Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995, without the Stribeck term), and viscous.
+//   z' = w - s |w| z / g,   torque against the motion = s z + d z' + b w
+//   z bristle (rad), w joint velocity (rad/s), s stiffness (N m/rad), d bristle damping (N m s/rad), g Coulomb torque (N m),
+//   b viscous (N m s/rad). Below g the joint holds: z answers the load, w returns to 0. Sliding: s z -> g sign(w).
+#pragma once
+
+namespace trocar::sim_plant {
+
+struct JointFrictionConfig {
+  double coulomb_nm{};  // 0 switches the bristle off
+  double viscous_nm_s{};
+  double stiffness_nm_per_rad{};
+  double bristle_damping_nm_s{};
+};
+
+struct JointFrictionState {
+  double bristle_rad{};
+};
+
+// The torque against the motion is offset_nm + slope_nm_s * w, w the mean velocity of the step: linear, so that an integrator
+// can take it implicitly. Which way the bristle moves is taken from `velocity_guess_rad_s`.
+struct LinearFriction {
+  double offset_nm{};
+  double slope_nm_s{};
+};
+[[nodiscard]] LinearFriction linearise(const JointFrictionConfig& config, const JointFrictionState& state, double velocity_guess_rad_s,
+                                       double dt_s) noexcept;
+
+// The bristle after dt at constant velocity: exact.
+[[nodiscard]] JointFrictionState update(const JointFrictionConfig& config, const JointFrictionState& state, double velocity_rad_s,
+                                        double dt_s) noexcept;
+
+}  // namespace trocar::sim_plant
