@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "../unit/hal/wired_rig.hpp"
 #include "hal/can/bits.hpp"
 #include "hal/can/cannelloni.hpp"
+#include "wired_rig.hpp"
 
 namespace trocar::hal {
 namespace {
