@@ -1,0 +1,221 @@
+#include "host/cli/demo.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <sstream>
+
+#include "common/capture/rig_capture.hpp"
+#include "common/capture/samples_csv.hpp"
+#include "common/config/user_error.hpp"
+#include "common/experiment/experiment_file.hpp"
+#include "host/cli/process.hpp"
+#include "host/experiment/runner.hpp"
+#include "host/report/report.hpp"
+
+namespace trocar::cli {
+
+namespace {
+
+constexpr double ready_s = 15.0;
+constexpr double end_s = 5.0;
+
+// One live line on a terminal; one line a phase elsewhere.
+class ProgressLine {
+ public:
+  void show(const host::Progress& p) {
+    if (!terminal_) {
+      if (p.phase != phase_) fmt::print(stderr, "{:3.0f} %  {}\n", 100.0 * p.fraction, p.phase);
+      phase_ = p.phase;
+      return;
+    }
+    constexpr int width = 20;
+    const auto filled = static_cast<std::size_t>(std::lround(width * p.fraction));
+    const int left = static_cast<int>(p.remaining_s);
+    fmt::print(stderr, "\r[{}{}] {:3.0f} %  {:<28.28} depth {:6.2f} mm  force {:6.3f} N  tick p99 {:3.0f} us  {:<8}  faults {}  {}:{:02} left \033[K",
+               std::string(filled, '#'), std::string(width - filled, '.'), 100.0 * p.fraction, p.phase, p.depth_mm, p.force_n, p.tick_p99_us,
+               to_string(p.mode), p.faults, left / 60, left % 60);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+  void end() {
+    if (shown_) fmt::print(stderr, "\n");
+    shown_ = false;
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) == 1;
+  bool shown_ = false;
+  std::string phase_;
+};
+
+std::filesystem::path make_folder(std::filesystem::path out) {
+  if (out.empty()) out = std::filesystem::path("runs") / fmt::format("{:%Y-%m-%d_%H-%M-%S}", fmt::localtime(std::time(nullptr)));
+  std::error_code error;
+  std::filesystem::create_directories(out, error);
+  if (!error && access(out.c_str(), W_OK | X_OK) != 0) error.assign(errno, std::generic_category());
+  if (error) throw config::UserError(fmt::format("{}: cannot write there ({}): give a folder that you may write to with --out", out.string(), error.message()));
+  for (const char* name : {"capture.mcap", "samples.csv", "run.toml", "report.html"})
+    if (std::filesystem::exists(out / name))
+      throw config::UserError(fmt::format("{}: holds {} of an earlier run: give another folder with --out, or none", out.string(), name));
+  return out;
+}
+
+int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const std::filesystem::path& out, std::atomic<bool>& stop) {
+  std::vector<std::string> arguments{"--experiment", options.experiment, "--out", out.string(), "--seed", std::to_string(options.seed), "--progress"};
+  if (!options.speeds_mm_s.empty()) {
+    arguments.push_back("--speeds");
+    arguments.push_back(fmt::format("{}", fmt::join(options.speeds_mm_s, ",")));
+  }
+  Process bench("trocar-bench", arguments);
+  ProgressLine line;
+  std::string rest;
+  std::string said;  // everything that is not progress
+  while (true) {
+    const std::string text = bench.read(0.1);
+    if (text.empty() && !bench.running()) break;
+    if (stop.load()) bench.signal(SIGINT);
+    rest += text;
+    for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n')) {
+      const std::string one = rest.substr(0, end);
+      rest.erase(0, end + 1);
+      std::istringstream in(one);
+      std::string word, mode;
+      host::Progress p;
+      if (in >> word >> p.fraction >> p.depth_mm >> p.force_n >> mode && word == "progress") {
+        std::getline(in >> std::ws, p.phase);
+        p.mode = mode == "Position" ? Mode::Position : Mode::Ready;
+        line.show(p);
+      } else {
+        said += one + "\n";
+      }
+    }
+  }
+  line.end();
+  const int code = bench.wait(end_s);
+  fmt::print(stderr, "{}", said);
+  return code;
+}
+
+int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out, std::atomic<bool>& stop) {
+  const std::uint32_t domain = options.domain >= 0 ? static_cast<std::uint32_t>(options.domain) : setup.rig.dds_domain;
+  std::optional<Process> plant, rig, recorder;
+  if (options.own_rig) {
+    std::vector<std::string> plant_arguments{"--rig",  setup.rig_file.string(), "--scene", setup.scene_file.string(), "--seed", std::to_string(options.seed),
+                                             "--die-with-parent"};
+    if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
+    plant.emplace("trocar-plant", plant_arguments);
+    plant->wait_for_line("trocar-plant: ", ready_s);
+    if (!plant->running()) throw config::UserError(plant->output());
+    rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain), "--best-effort", "--die-with-parent"});
+    rig->wait_for_line("DDS domain", ready_s);
+  }
+  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain)});
+  recorder->wait_for_line("recording to", ready_s);
+
+  ProgressLine line;
+  experiment::Run run;
+  try {
+    run = host::run_experiment(setup, domain, stop, [&](const host::Progress& p) { line.show(p); });
+  } catch (...) {
+    line.end();
+    recorder->signal(SIGINT);
+    recorder->wait(end_s);
+    throw;
+  }
+  line.end();
+  // The last samples are on their way: the recorder goes first only after they had time to arrive.
+  (void)recorder->read(0.3);
+  bool clean = true;
+  const auto stop_child = [&](std::optional<Process>& child, const char* name, int number) {
+    if (!child) return;
+    child->signal(number);
+    const int code = child->wait(end_s);
+    if (code != 0) {
+      clean = false;
+      fmt::print(stderr, "trocar: {} ended with code {}: {}\n", name, code, child->output());
+    }
+  };
+  stop_child(rig, "trocar-rig", SIGTERM);
+  stop_child(recorder, "the recorder", SIGINT);
+  stop_child(plant, "trocar-plant", SIGTERM);
+
+  experiment::write_run(out, run);
+  const capture::RigLog log = capture::read_capture(out / "capture.mcap");
+  capture::write_samples_csv(out / "samples.csv", log.samples);
+  if (!run.completed) {
+    fmt::print(stderr, "trocar: the experiment did not finish: {}\n", run.outcome);
+    return 1;
+  }
+  return clean ? 0 : 1;
+}
+
+report::Phase::Kind report_kind(experiment::PhaseKind kind) {
+  using From = experiment::PhaseKind;
+  using To = report::Phase::Kind;
+  switch (kind) {
+    case From::Air: return To::Air;
+    case From::Touch: return To::Touch;
+    case From::Insert: return To::Insert;
+    case From::Dwell: return To::Dwell;
+    case From::Withdraw: return To::Withdraw;
+    case From::Prepare: return To::Other;
+  }
+  return To::Other;
+}
+
+}  // namespace
+
+int make_report(const std::filesystem::path& folder, bool json) {
+  const experiment::Run run = experiment::read_run(folder);
+  const capture::RigLog log = capture::read_capture(folder / "capture.mcap");
+  if (log.samples.empty()) throw config::UserError(fmt::format("{}: the capture holds no samples: nothing to report", folder.string()));
+  report::RunInfo info;
+  info.folder = folder;
+  info.rig = run.rig;
+  info.scene = run.scene;
+  info.lockstep = run.lockstep;
+  info.surface_y_m = run.placement.surface_y_m;
+  info.needle_length_m = run.placement.needle_length_m;
+  info.kp_n_per_m = run.thesis_stiffness_n_per_m;
+  info.notes = run.notes;
+  for (const auto& p : run.phases) info.phases.push_back({p.name, report_kind(p.kind), p.speed_m_s, p.gain_set, p.first_tick, p.last_tick});
+  if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
+  if (run.lockstep) info.notes.push_back(fmt::format("{:.1f} s simulated in {:.1f} s, {:.1f} times real time", run.simulated_s, run.wall_s, run.simulated_s / run.wall_s));
+  const report::Summary summary = report::summarise(info, log.samples);
+  report::write_report(info, summary, log.samples);
+  if (json) {
+    fmt::print("{}\n", report::to_json(summary));
+  } else {
+    fmt::print("{}report: {}\n", report::to_text(summary), (folder / "report.html").string());
+  }
+  return 0;
+}
+
+int run_demo(const DemoOptions& options, std::atomic<bool>& stop) {
+  std::vector<double> speeds;
+  for (const double v : options.speeds_mm_s) speeds.push_back(1e-3 * v);
+  const host::ExperimentSetup setup = host::read_setup(options.experiment, speeds);
+  const auto out = make_folder(options.out);
+  int code = 1;
+  try {
+    code = options.lockstep ? run_lockstep(options, setup, out, stop) : run_processes(options, setup, out, stop);
+  } catch (...) {
+    // Nothing half-made stays behind: a folder that holds no recording is removed again.
+    std::error_code ignored;
+    if (!std::filesystem::exists(out / "capture.mcap")) std::filesystem::remove(out, ignored);
+    throw;
+  }
+  if (std::filesystem::exists(out / "run.toml")) make_report(out, options.json);
+  return code;
+}
+
+}  // namespace trocar::cli

@@ -1,0 +1,42 @@
+// Controller and plant in lock-step on a virtual clock, in one process: the real controller, the real bus protocol with its bit
+// times, the simulated machine. Faster than real time, and the same bits every time.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/rig/rig.hpp"
+#include "firmware/controller/controller.hpp"
+#include "hal/can/memory_bus.hpp"
+#include "hal/rig_link.hpp"
+#include "sim_plant/wired/wired_plant.hpp"
+
+namespace trocar::sim_plant {
+
+class Bench {
+ public:
+  Bench(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed);
+
+  // One controller period. Afterwards sample() is the tick's, and mail() has what the controller said.
+  void tick() noexcept;
+
+  [[nodiscard]] controller::Mailboxes& mail() noexcept { return *mail_; }
+  [[nodiscard]] controller::Controller& controller() noexcept { return controller_; }
+  [[nodiscard]] const Sample& sample() noexcept { return controller_.sample(); }
+  [[nodiscard]] WiredPlant& plant() noexcept { return plant_; }
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
+  [[nodiscard]] hal::RigLink<hal::MemoryPort>& link() noexcept { return link_; }
+
+ private:
+  void step_plant(std::int64_t now_ns) noexcept;
+
+  rig::Rig rig_;
+  std::unique_ptr<controller::Mailboxes> mail_;
+  hal::MemoryBus drives_bus_, sensor_bus_;
+  hal::RigLink<hal::MemoryPort> link_;
+  controller::Controller controller_;
+  WiredPlant plant_;
+  std::int64_t now_ns_{};
+};
+
+}  // namespace trocar::sim_plant

@@ -1,0 +1,146 @@
+// trocar-bench: a whole experiment in lock-step, without real time. Leaves samples.csv, capture.mcap and run.toml.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/capture/rig_capture.hpp"
+#include "common/capture/samples_csv.hpp"
+#include "common/config/rig_file.hpp"
+#include "common/config/scene_file.hpp"
+#include "common/config/share.hpp"
+#include "common/config/user_error.hpp"
+#include "common/experiment/experiment.hpp"
+#include "common/experiment/experiment_file.hpp"
+#include "common/wire/convert.hpp"
+#include "sim_plant/bench/bench.hpp"
+#include "sim_plant/plant/plant_file.hpp"
+
+namespace {
+
+using namespace trocar;
+
+std::atomic<bool> stop_asked{false};
+void on_signal(int) { stop_asked.store(true); }
+
+struct Options {
+  std::string experiment = "insertion";
+  std::vector<double> speeds_mm_s;
+  std::filesystem::path out;
+  std::uint64_t seed = 1;
+  bool progress{};
+};
+
+constexpr std::uint64_t session = 1;
+constexpr std::size_t batch = 20;
+constexpr std::int64_t keep_alive_ns = 20'000'000;
+
+int run(const Options& options) {
+  experiment::Experiment e = experiment::read_experiment(config::find_share("experiments", options.experiment));
+  if (!options.speeds_mm_s.empty()) {
+    e.speeds_m_s.clear();
+    for (const double v : options.speeds_mm_s) e.speeds_m_s.push_back(1e-3 * v);
+  }
+  const rig::Rig rig = config::read_rig(config::find_share("rigs", e.rig));
+  const config::SceneFile scene = config::read_scene(config::find_share("scenes", e.scene));
+  const experiment::Placement placement{scene.tissue.grid.origin_m[1], scene.tissue.grid.origin_m[0] + 0.5 * scene.tissue.grid.size_m[0],
+                                        scene.needle.length_m};
+  experiment::Sequencer sequencer(e, placement, rig, session);
+  sim_plant::Bench bench(rig, sim_plant::read_plant(config::find_share("plants", e.plant)), sim_plant::phantom_config(scene), options.seed);
+
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error) throw config::UserError(fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
+  capture::RigCaptureWriter capture(options.out / "capture.mcap");
+  capture::SamplesCsv csv(options.out / "samples.csv");
+
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<Sample> pending;
+  std::int64_t next_keep_alive_ns = 0;
+  std::uint64_t ticks = 0;
+  const auto write_pending = [&] {
+    if (!pending.empty()) capture.write_samples(pending, static_cast<std::uint64_t>(bench.now_ns()));
+    pending.clear();
+  };
+  while (!sequencer.finished() && !stop_asked.load()) {
+    if (auto command = sequencer.next()) {
+      capture.write(wire::to_wire(*command, rig.gain_set[command->gain_set].name.data(), bench.now_ns(), 0), static_cast<std::uint64_t>(bench.now_ns()));
+      bench.mail().commands.push(*command);
+    }
+    if (bench.now_ns() >= next_keep_alive_ns) {
+      bench.mail().commands.push({.session = session, .kind = CommandKind::KeepAlive});
+      next_keep_alive_ns = bench.now_ns() + keep_alive_ns;
+    }
+    bench.tick();
+    const auto time_ns = static_cast<std::uint64_t>(bench.now_ns());
+    csv.write(bench.sample());
+    pending.push_back(bench.sample());
+    if (pending.size() == batch) write_pending();
+    Event event;
+    while (bench.mail().events.pop(event)) capture.write(wire::to_wire(event), time_ns);
+    Reply reply;
+    std::vector<Reply> replies;
+    while (bench.mail().replies.pop(reply)) {
+      capture.write(wire::to_wire(reply), time_ns);
+      replies.push_back(reply);
+    }
+    sequencer.on_sample(bench.sample());
+    for (const Reply& r : replies) sequencer.on_reply(r);
+    if (options.progress && ++ticks % 500 == 0)
+      fmt::print(stderr, "progress {:.4f} {:.3f} {:.4f} {} {}\n", sequencer.progress(), 1e3 * sequencer.tip_depth_m(bench.sample()),
+                 bench.sample().base_wrench[1], to_string(bench.sample().mode), sequencer.phase_name());
+  }
+  write_pending();
+  capture.close();
+  csv.finish();
+
+  experiment::Run result;
+  result.experiment = e.name;
+  result.rig = rig.name.data();
+  result.scene = e.scene;
+  result.lockstep = true;
+  result.placement = placement;
+  for (std::size_t i = 0; i < rig.gain_sets; ++i)
+    if (std::string(rig.gain_set[i].name.data()) == "thesis") result.thesis_stiffness_n_per_m = rig.gain_set[i].translation.proportional;
+  result.simulated_s = 1e-9 * static_cast<double>(bench.now_ns());
+  result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.completed = sequencer.finished() && !sequencer.failed();
+  result.outcome = stop_asked.load() ? "stopped by the user" : sequencer.failure();
+  result.phases = sequencer.phases();
+  result.notes = sequencer.notes();
+  experiment::write_run(options.out, result);
+  fmt::print("{:.1f} s simulated in {:.1f} s ({:.1f} times real time)\n", result.simulated_s, result.wall_s, result.simulated_s / result.wall_s);
+  if (result.completed) return 0;
+  fmt::print(stderr, "trocar-bench: {}\n", result.outcome);
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app{"trocar-bench: controller and simulated plant in lock-step on a virtual clock.\nExample: trocar-bench --experiment insertion --out runs/bench"};
+  app.add_option("--experiment", options.experiment, "experiment name, or path of its TOML file")->capture_default_str();
+  app.add_option("--speeds", options.speeds_mm_s, "insertion speeds in mm/s instead of the file's, such as 1,9")->delimiter(',')->check(CLI::Range(0.01, 200.0));
+  app.add_option("--out", options.out, "folder for the results")->required();
+  app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
+  app.add_flag("--progress", options.progress, "progress for a parent program, on stderr");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    return run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "trocar-bench: {}\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,122 @@
+// trocar-plant: the simulated machine behind the real wire. A controller cannot tell it from hardware.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "common/config/rig_file.hpp"
+#include "common/config/scene_file.hpp"
+#include "common/config/share.hpp"
+#include "common/config/user_error.hpp"
+#include "hal/can/endpoint_bus.hpp"
+#include "hal/realtime/clock.hpp"
+#include "sim_plant/plant/plant_file.hpp"
+#include "sim_plant/wired/wired_plant.hpp"
+
+namespace {
+
+using namespace trocar;
+namespace rt = hal::realtime;
+
+std::atomic<bool> stop_asked{false};
+void on_signal(int) { stop_asked.store(true); }
+
+struct Options {
+  std::string rig = "ubc_twin";
+  std::string scene = "phantom";
+  std::string plant = "ubc_twin";
+  std::uint64_t seed = 1;
+  bool log_drives{};
+};
+
+constexpr std::int64_t longest_wait_ns = 500'000;
+// A starved simulation slows down instead of integrating an old torque for long: real drives would not have been starved.
+constexpr std::int64_t longest_step_ns = 5'000'000;
+
+int run(const Options& options) {
+  const auto rig_file = config::find_share("rigs", options.rig);
+  const rig::Rig rig = config::read_rig(rig_file);
+  const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
+  const auto phantom = sim_plant::phantom_config(config::read_scene(config::find_share("scenes", options.scene)));
+  hal::EndpointBus drives;
+  hal::EndpointBus sensor;
+  const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
+    const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Plant);
+    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", rig_file.string(), name, status.message.data()));
+  };
+  open(drives, rig.buses.drives, "drives");
+  open(sensor, rig.buses.sensor, "sensor");
+  auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, phantom, options.seed);
+  fmt::print("trocar-plant: {} before scene {}, seed {}\n", rig.name.data(), options.scene, options.seed);
+  std::fflush(stdout);
+
+  const std::array<int, 2> inputs{drives.file_descriptor(), sensor.file_descriptor()};
+  std::int64_t wall_ns = rt::monotonic_now_ns();
+  std::int64_t now_ns = 0;  // the plant's own clock
+  std::uint64_t starved = 0;
+  std::array<hal::canopen::DriveState, sim_plant::WiredPlant::drives> known{};
+  hal::CanFrame frame;
+  while (!stop_asked.load()) {
+    rt::wait_for_input(inputs, rt::monotonic_now_ns() + longest_wait_ns);
+    const std::int64_t wall = rt::monotonic_now_ns();
+    if (wall - wall_ns > longest_step_ns) ++starved;
+    now_ns += std::min(wall - wall_ns, longest_step_ns);
+    wall_ns = wall;
+    plant->advance(now_ns);
+    while (drives.receive(frame, now_ns))
+      for (std::size_t i = 0; i < plant->drives; ++i) plant->drive_receives(i, frame, now_ns);
+    while (sensor.receive(frame, now_ns)) plant->sensor_receives(frame, now_ns);
+    for (std::size_t i = 0; i < plant->drives; ++i)
+      while (plant->drive_transmits(i, frame)) drives.send(frame, now_ns);
+    drives.flush(now_ns);
+    while (plant->sensor_transmits(frame)) sensor.send(frame, now_ns);
+    sensor.flush(now_ns);
+    if (!options.log_drives) continue;
+    for (std::size_t i = 0; i < plant->drives; ++i) {
+      if (plant->drive(i).state() == known[i]) continue;
+      known[i] = plant->drive(i).state();
+      fmt::print("drive {} {} at {:.1f} ms, motor torque {:g} N m\n", i + 1, hal::canopen::to_string(known[i]), 1e-6 * static_cast<double>(now_ns),
+                 plant->drive(i).motor_torque_nm());
+      std::fflush(stdout);
+    }
+  }
+  const auto& p = plant->physics();
+  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times; phantom: {} steps, {} unconverged\n", 1e-9 * static_cast<double>(p.time_ns()), starved,
+             p.phantom().counters().steps, p.phantom().counters().unconverged);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  bool die_with_parent = false;
+  CLI::App app{"trocar-plant: a simulated rig and tissue on the rig's buses.\nExample: trocar-plant --rig ubc_twin --scene phantom"};
+  app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
+  app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
+  app.add_option("--plant", options.plant, "plant name (how the machine differs from its rig file), or path")->capture_default_str();
+  app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
+  app.add_flag("--log-drives", options.log_drives, "print every change of a drive's state, with the plant's time");
+  app.add_flag("--die-with-parent", die_with_parent, "stop when the process that started this one ends");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  if (die_with_parent) prctl(PR_SET_PDEATHSIG, SIGTERM);
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    return run(options);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "trocar-plant: {}\n", e.what());
+    return 1;
+  }
+}
