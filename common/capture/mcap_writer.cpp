@@ -53,6 +53,7 @@ const char* remedy(int error) {
 
 McapWriter::McapWriter(std::filesystem::path path, McapOptions options) : path_(std::move(path)), options_(std::move(options)) {
   fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  const bool created = fd_ >= 0;
   // A device may exist already (a test of a full disk); only a regular file is somebody's recording.
   if (fd_ < 0 && errno == EEXIST && !std::filesystem::is_regular_file(path_)) fd_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
   if (fd_ < 0) {
@@ -66,7 +67,7 @@ McapWriter::McapWriter(std::filesystem::path path, McapOptions options) : path_(
   try {
     put(out);
   } catch (...) {
-    ::close(fd_);
+    if (created) ::unlink(path_.c_str());
     throw;
   }
 }
