@@ -67,10 +67,10 @@ namespace detail {
 std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, const void*, std::int64_t), void* context);
 }  // namespace detail
 
-template <class T>
+template <Topical T>
 class Reader {
  public:
-  explicit Reader(const Participant& participant) : entity_(detail::make_reader(participant, TypeSupport<T>::topic)) {}
+  explicit Reader(const Participant& participant) : entity_(detail::make_reader(participant, topic_of<T>)) {}
 
   // Takes everything that has arrived; visit(const T&) or visit(const T&, std::int64_t written_ns). Returns how many.
   template <class Visit>
@@ -83,7 +83,7 @@ class Reader {
         function(*static_cast<const T*>(value));
       }
     };
-    return detail::take(entity_.get(), TypeSupport<T>::topic, call, const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+    return detail::take(entity_.get(), topic_of<T>, call, const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
   }
   [[nodiscard]] std::uint32_t matched() const { return detail::matched_by_reader(entity_.get()); }  // writers seen now
   [[nodiscard]] dds_entity_t entity() const noexcept { return entity_.get(); }
@@ -92,13 +92,13 @@ class Reader {
   Entity entity_;
 };
 
-template <class T>
+template <Topical T>
 class Writer {
  public:
-  explicit Writer(const Participant& participant) : entity_(detail::make_writer(participant, TypeSupport<T>::topic)) {}
+  explicit Writer(const Participant& participant) : entity_(detail::make_writer(participant, topic_of<T>)) {}
 
   // False when a reader did not keep up with a reliable topic for 100 ms; the value is then not sent.
-  [[nodiscard]] bool write(const T& value) { return detail::write(entity_.get(), &value, TypeSupport<T>::topic); }
+  [[nodiscard]] bool write(const T& value) { return detail::write(entity_.get(), &value, topic_of<T>); }
   [[nodiscard]] std::uint32_t matched() const { return detail::matched_by_writer(entity_.get()); }  // readers seen now
   [[nodiscard]] dds_entity_t entity() const noexcept { return entity_.get(); }
 

@@ -8,11 +8,11 @@
 namespace trocar::wire {
 
 struct Topic {
-  const char* name;
-  const char* type;  // as in rig.idl
-  bool reliable;
-  bool transient_local;  // a late reader still gets the last `depth` values
-  std::uint32_t depth;   // samples kept per writer and reader; 0 keeps all
+  const char* name{};
+  const char* type{};  // as in rig.idl
+  bool reliable{};
+  bool transient_local{};  // a late reader still gets the last `depth` values
+  std::uint32_t depth{};   // samples kept per writer and reader; 0 keeps all
 };
 
 // Samples: a lost batch is history, resending would only delay the next; deep, so that a reader may sleep for seconds.

@@ -13,24 +13,52 @@ using Event = trocar_wire_Event;
 using Command = trocar_wire_Command;
 using Reply = trocar_wire_Reply;
 
-// Each type travels on exactly one topic, so the type alone names the topic and its quality of service.
+// How each type is laid out …
 template <class T>
-struct TypeSupport;
+[[nodiscard]] const dds_topic_descriptor_t& descriptor() noexcept;
+template <>
+inline const dds_topic_descriptor_t& descriptor<Sample>() noexcept {
+  return trocar_wire_Sample_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<SampleBatch>() noexcept {
+  return trocar_wire_SampleBatch_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<Status>() noexcept {
+  return trocar_wire_Status_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<Event>() noexcept {
+  return trocar_wire_Event_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<Command>() noexcept {
+  return trocar_wire_Command_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<Reply>() noexcept {
+  return trocar_wire_Reply_desc;
+}
 
-#define TROCAR_WIRE_TYPE(TYPE, TOPIC)                                                                \
-  template <>                                                                                        \
-  struct TypeSupport<TYPE> {                                                                         \
-    static constexpr const Topic& topic = TOPIC;                                                     \
-    static const dds_topic_descriptor_t& descriptor() noexcept { return trocar_wire_##TYPE##_desc; } \
-  }
-TROCAR_WIRE_TYPE(SampleBatch, samples_topic);
-TROCAR_WIRE_TYPE(Status, status_topic);
-TROCAR_WIRE_TYPE(Event, events_topic);
-TROCAR_WIRE_TYPE(Command, command_topic);
-TROCAR_WIRE_TYPE(Reply, reply_topic);
-#undef TROCAR_WIRE_TYPE
+// … and the one topic that it travels on, so that the type alone names topic and quality of service. A Sample travels in batches only.
+template <class T>
+inline constexpr Topic topic_of = {};
+template <>
+inline constexpr Topic topic_of<SampleBatch> = samples_topic;
+template <>
+inline constexpr Topic topic_of<Status> = status_topic;
+template <>
+inline constexpr Topic topic_of<Event> = events_topic;
+template <>
+inline constexpr Topic topic_of<Command> = command_topic;
+template <>
+inline constexpr Topic topic_of<Reply> = reply_topic;
 
-// In the order of `topics`.
+template <class T>
+concept Topical = topic_of<T>
+.name != nullptr;
+
 [[nodiscard]] const dds_topic_descriptor_t& descriptor_of(const Topic& topic);
 
 }  // namespace trocar::wire

@@ -1,0 +1,98 @@
+#include "common/capture/rig_capture.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+
+namespace trocar::capture {
+
+RigCaptureWriter::RigCaptureWriter(const std::filesystem::path& path) : file_(path, {.profile = "", .library = "trocar"}) {
+  for (std::size_t i = 0; i < wire::topics.size(); ++i) {
+    const wire::Topic& topic = wire::topics[i];
+    const char* type = topic.name == wire::samples_topic.name ? wire::descriptor<wire::Sample>().m_typename : topic.type;
+    channels_[i] = file_.add_channel(file_.add_schema(type, "omgidl", wire::idl_text()), topic.name, "cdr",
+                                     {{"protocol", std::to_string(protocol_version)}});
+  }
+}
+
+std::uint16_t RigCaptureWriter::channel_of(const wire::Topic& topic) const {
+  const auto found =
+      std::ranges::find(wire::topics, std::string_view(topic.name), [](const wire::Topic& t) { return std::string_view(t.name); });
+  if (found == wire::topics.end()) throw CaptureError(std::string("captures have no topic ") + topic.name);
+  return channels_[static_cast<std::size_t>(found - wire::topics.begin())];
+}
+
+void RigCaptureWriter::write_cdr(const wire::Topic& topic, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
+                                 std::span<const std::byte> cdr) {
+  file_.write(channel_of(topic), log_time_ns, publish_time_ns, cdr);
+}
+
+void RigCaptureWriter::write_batch_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr) {
+  const auto samples = split_batch(cdr);
+  const Decoded<wire::SampleBatch> batch(cdr);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const std::int64_t last_ns = batch->samples._buffer[samples.size() - 1].time_ns;
+    const auto earlier_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, last_ns - batch->samples._buffer[i].time_ns));
+    write_cdr(wire::samples_topic, log_time_ns - std::min(log_time_ns, earlier_ns), publish_time_ns, samples[i]);
+  }
+}
+
+void RigCaptureWriter::write_samples(std::span<const trocar::Sample> samples, std::uint64_t start_ns) {
+  for (const trocar::Sample& sample : samples) {
+    const std::uint64_t time_ns = start_ns + static_cast<std::uint64_t>(std::max<std::int64_t>(0, sample.time_ns));
+    write_cdr(wire::samples_topic, time_ns, time_ns, serialise(wire::to_wire(sample)));
+  }
+}
+
+void TickCounter::see(std::uint64_t tick) noexcept {
+  if (ticks_ > 0) {
+    if (tick <= last_) {
+      ++restarts_;
+    } else if (tick - last_ > 1) {
+      ++gaps_;
+      lost_ += tick - last_ - 1;
+    }
+  }
+  last_ = tick;
+  ++ticks_;
+}
+
+RigLog read_capture(const std::filesystem::path& path) {
+  RigLog log;
+  std::vector<std::string> problems;
+  std::set<const Channel*> checked;
+  const auto check_version = [&](const Channel& channel) {
+    if (!checked.insert(&channel).second) return;
+    const auto found = channel.metadata.find("protocol");
+    const std::string theirs = found == channel.metadata.end() ? "of no number" : found->second;
+    if (theirs == std::to_string(protocol_version)) return;
+    throw CaptureError(channel.topic + " in " + path.string() + " was recorded with protocol " + theirs + ", this program reads " +
+                       std::to_string(protocol_version) + ": use the version of trocar that recorded it");
+  };
+  McapReader reader(path);
+  log.report = reader.read([&](const Message& message) {
+    const std::string& topic = message.channel->topic;
+    check_version(*message.channel);
+    ++log.messages[topic];
+    try {
+      if (topic == wire::samples_topic.name) {
+        const Decoded<wire::Sample> sample(message.data);
+        log.samples.push_back(wire::from_wire(*sample));
+        log.ticks.see(sample->tick);
+      } else if (topic == wire::events_topic.name) {
+        const Decoded<wire::Event> event(message.data);
+        log.events.push_back({wire::from_wire(*event), event->text});
+      }
+    } catch (const CdrError& error) {
+      problems.push_back(topic + " message " + std::to_string(message.sequence) + " does not decode: " + error.what());
+    }
+  });
+  log.report.problems.insert(log.report.problems.end(), problems.begin(), problems.end());
+  return log;
+}
+
+std::vector<trocar::Sample> read_samples(const std::filesystem::path& path) { return std::move(read_capture(path).samples); }
+
+}  // namespace trocar::capture
