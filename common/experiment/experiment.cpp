@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace trocar::experiment {
 
@@ -31,6 +32,7 @@ Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, c
   planned_ = {rig.homing_pose[0], rig.homing_pose[1]};
   const Experiment& e = experiment_;
 
+  add_wait(PhaseKind::Prepare, "settle", 0.2);
   add(PhaseKind::Prepare, "home", CommandKind::Home, 0.1);
   add(PhaseKind::Prepare, "tare", CommandKind::Tare, 0.3);
   add(PhaseKind::Prepare, "arm", CommandKind::Arm, 0.1);
@@ -67,6 +69,7 @@ Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, c
     add_insertion(fmt::format("thesis gains, {:g} mm/s", 1e3 * e.thesis_speed_m_s), x, e.thesis_speed_m_s);
     add(PhaseKind::Prepare, "default gains", CommandKind::SelectGains, 0.1);
     planned_gains_ = rig.gain_set[0].name.data();
+    add_wait(PhaseKind::Prepare, "settle", 0.5);
   }
   add_move(PhaseKind::Air, "return", rig.homing_pose[0], rig.homing_pose[1] + placement_.needle_length_m - placement_.surface_y_m,
            e.approach_speed_m_s);

@@ -117,6 +117,7 @@ class Controller {
   mechanism::Vec3 sensor_wrench_ = mechanism::Vec3::Zero();  // needle frame: along, across, moment; tare not removed
   mechanism::Vec3 tare_ = mechanism::Vec3::Zero();           // needle frame
   mechanism::Vec3 base_wrench_ = mechanism::Vec3::Zero();    // rig frame, tare removed
+  mechanism::Vec3 load_ = mechanism::Vec3::Zero();         // base_wrench_, low-passed
   bool tared_{};
 
   // what runs
