@@ -1,8 +1,9 @@
-// Friction of one joint: Coulomb with a stick phase, as a bristle that bends and slides (Dahl 1968; with damping of the bristle as
-// in Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995, without the Stribeck term), and viscous.
-//   z' = w - s |w| z / g,   torque against the motion = s z + d z' + b w
-//   z bristle (rad), w joint velocity (rad/s), s stiffness (N m/rad), d bristle damping (N m s/rad), g Coulomb torque (N m),
-//   b viscous (N m s/rad). Below g the joint holds: z answers the load, w returns to 0. Sliding: s z -> g sign(w).
+// Friction of one joint: Coulomb with a true stick phase, as a bristle that bends, then slides (elastoplastic: Dupont, Hayward,
+// Armstrong, Altpeter, IEEE Trans. Automatic Control 47, 2002; our transition is linear), and viscous.
+//   z' = w p(z),   torque against the motion = s z + d z' + b w
+//   z bristle (rad), w joint velocity (rad/s), s stiffness (N m/rad), d bristle damping (N m s/rad), b viscous (N m s/rad).
+//   r = s z sign(w) / g, g the Coulomb torque (N m):  p = 1 up to r = 0.8,  p = (1 - r) / 0.2 from there to 1
+// Below 0.8 g the joint is a spring: it holds for ever and does not creep under vibration. Sliding: s z -> g sign(w).
 #pragma once
 
 namespace trocar::sim_plant {
