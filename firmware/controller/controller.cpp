@@ -187,6 +187,9 @@ void Controller::execute(const Command& command) noexcept {
         code = ReplyCode::NotAtRest;
       } else {
         gain_set_ = command.gain_set;
+        // Bumpless: the new gains start from where the handle stands, not from the old gains' error.
+        if (position_controlled() && pose_valid_) motion_.rest(state_.x);
+        pid_ = {};
         code = ReplyCode::Done;
       }
       break;

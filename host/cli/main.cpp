@@ -1,0 +1,117 @@
+// trocar: the host's command line.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "common/config/rig_file.hpp"
+#include "common/config/share.hpp"
+#include "common/config/user_error.hpp"
+#include "host/capture/recorder.hpp"
+#include "host/cli/demo.hpp"
+#include "host/cli/rig_commands.hpp"
+
+namespace {
+
+using namespace trocar;
+
+std::atomic<bool> stop_asked{false};
+void on_signal(int) { stop_asked.store(true); }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"trocar: runs a needle-insertion rig, or a simulated one.\nExample: trocar demo"};
+  app.require_subcommand(1);
+  std::int64_t domain = -1;
+  std::string rig = "ubc_twin";
+  bool json = false;
+  int code = 0;
+
+  const auto domain_of = [&] {
+    return domain >= 0 ? static_cast<std::uint32_t>(domain) : config::read_rig(config::find_share("rigs", rig)).dds_domain;
+  };
+  const auto with_domain = [&](CLI::App* c) { c->add_option("--domain", domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230)); };
+  const auto with_experiment = [&](CLI::App* c, cli::DemoOptions& o) {
+    c->add_option("--speeds", o.speeds_mm_s, "insertion speeds in mm/s instead of the experiment's, such as 1,3,5,7,9")->delimiter(',')->check(CLI::Range(0.01, 200.0));
+    c->add_option("--out", o.out, "folder for the results (default runs/<time>)");
+    c->add_flag("--json", o.json, "the summary as JSON on stdout");
+    with_domain(c);
+  };
+
+  cli::DemoOptions demo;
+  auto* demo_command = app.add_subcommand("demo", "the whole simulated experiment: plant, controller, recorder, report\nExample: trocar demo --speeds 1,9");
+  with_experiment(demo_command, demo);
+  demo_command->add_option("--experiment", demo.experiment, "experiment name, or path of its TOML file")->capture_default_str();
+  demo_command->add_flag("--lockstep", demo.lockstep, "on the bench: one process, virtual clock, repeatable to the bit");
+  demo_command->add_option("--seed", demo.seed, "of the simulated noise")->capture_default_str();
+  demo_command->callback([&] {
+    demo.domain = domain;
+    code = cli::run_demo(demo, stop_asked);
+  });
+
+  auto* experiment_command = app.add_subcommand("experiment", "run an experiment on a rig that is already up");
+  experiment_command->require_subcommand(1);
+  cli::DemoOptions experiment;
+  experiment.own_rig = false;
+  auto* run_command = experiment_command->add_subcommand("run", "Example: trocar experiment run insertion --speeds 3");
+  run_command->add_option("experiment", experiment.experiment, "experiment name, or path of its TOML file")->required();
+  with_experiment(run_command, experiment);
+  run_command->callback([&] {
+    experiment.domain = domain;
+    code = cli::run_demo(experiment, stop_asked);
+  });
+
+  auto* record_command = app.add_subcommand("record", "record everything that a rig publishes to an MCAP file until Ctrl-C\nExample: trocar record --out run.mcap");
+  host::RecordOptions record;
+  record_command->add_option("--out", record.out, "a file that ends in .mcap, or a folder")->required();
+  record_command->add_option("--rig", rig, "rig whose DDS domain to listen to")->capture_default_str();
+  with_domain(record_command);
+  record_command->callback([&] {
+    record.domain = domain_of();
+    record.say = [](const std::string& line) {
+      fmt::print("{}\n", line);
+      std::fflush(stdout);
+    };
+    code = host::run_record(record, stop_asked);
+  });
+
+  auto* report_command = app.add_subcommand("report", "make figures and report.html from the folder of a run\nExample: trocar report runs/2026-01-31_12-00-00");
+  std::filesystem::path folder;
+  report_command->add_option("folder", folder, "folder of a run")->required();
+  report_command->add_flag("--json", json, "the summary as JSON on stdout");
+  report_command->callback([&] { code = cli::make_report(folder, json); });
+
+  auto* rig_command = app.add_subcommand("rig", "look at a rig, home, arm, hold and stop it");
+  rig_command->require_subcommand(1);
+  const auto add_rig = [&](const char* name, const char* text, auto run) {
+    auto* c = rig_command->add_subcommand(name, text);
+    c->add_option("rig", rig, "rig name, or path of its TOML file")->capture_default_str();
+    with_domain(c);
+    c->add_flag("--json", json, "machine-readable, on stdout");
+    c->callback([&, run] { code = run(); });
+  };
+  add_rig("info", "what a rig file describes: workspace, resolution, forces, bus load\nExample: trocar rig info ubc_twin_haptic", [&] { return cli::rig_info(rig, json); });
+  add_rig("status", "what the running controller is doing", [&] { return cli::rig_status(domain_of(), json); });
+  add_rig("home", "take the encoder offsets; the handle stands in its jig", [&] { return cli::rig_home(domain_of()); });
+  add_rig("arm", "enable torque and stay armed until Ctrl-C", [&] { return cli::rig_arm(domain_of(), stop_asked); });
+  add_rig("hold", "brake and hold; open to everybody", [&] { return cli::rig_hold(domain_of()); });
+  add_rig("stop", "brake, then torque off; open to everybody", [&] { return cli::rig_stop(domain_of()); });
+  add_rig("reset", "clear a latched fault whose cause is gone", [&] { return cli::rig_reset(domain_of()); });
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    app.parse(argc, argv);
+    return code;
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "trocar: {}\n", e.what());
+    return 1;
+  }
+}
