@@ -82,6 +82,16 @@ TEST_F(SceneFileTest, FillsEveryMemberFromTheFile) {
   EXPECT_EQ(scene.contact.velocity_law->tip_n_per_m, (std::vector{68.0, 60.0, 61.0}));
 }
 
+TEST_F(SceneFileTest, ReadsEverySceneThatIsShipped) {
+  std::size_t read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(TROCAR_SHARE "/scenes")) {
+    if (entry.path().extension() != ".toml") continue;
+    EXPECT_NO_THROW(static_cast<void>(read_scene(entry.path())));
+    ++read;
+  }
+  EXPECT_GE(read, 1u);
+}
+
 TEST_F(SceneFileTest, LeavesTheVelocityLawOutWhenNoneIsNamed) {
   EXPECT_FALSE(read_scene(write(edited(scene_text, "velocity_law = \"ours\"\n", "velocity_law = \"none\"\n").text))
                    .contact.velocity_law.has_value());
