@@ -37,7 +37,7 @@ std::string head(const std::string& name, int width, int height) {
       "set terminal svg size {},{} dynamic noenhanced font 'sans-serif,15' name '{}' background '#FFFFFF'\n"
       "set output folder.'/{}.svg'\n"
       "set encoding utf8\n"
-      "set border 3 lc rgb '#555555'\nset tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
+      "set rmargin 4\nset border 3 lc rgb '#555555'\nset tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
       "set grid lc rgb '#DDDDDD' lw 0.7 lt 1\nset key noautotitle textcolor rgb '#333333'\n",
       width, height, name, name);
 }
@@ -95,8 +95,8 @@ std::string force_depth_script(const RunInfo& run, std::span<const Sample> sampl
   return head("force_depth", 900, 520) + blocks +
          fmt::format(
              "set xlabel 'depth of the tip below the surface [mm]'\nset ylabel 'force at the base, along the needle [N]'\n"
-             "set key top left Left reverse samplen 2\nset xzeroaxis lc rgb '{0}' lt 1 lw 1\n"
-             "plot {1}*x/1000 with lines lw 1.5 dt (2,4) lc rgb '{0}' title 'thesis: {1} N/m at 1 mm/s'{2}\n",
+             "set xrange [-3:*]\nset samples 500\nset key top left Left reverse samplen 2\nset xzeroaxis lc rgb '{0}' lt 1 lw 1\n"
+             "plot (x < 0 ? 1/0 : {1}*x/1000) with lines lw 1.5 dt (2,4) lc rgb '{0}' title 'thesis: {1} N/m at 1 mm/s'{2}\n",
              dark, thesis_shaft_n_per_m, plots);
 }
 
@@ -173,7 +173,7 @@ std::string tracking_script(const RunInfo& run, std::span<const Sample> samples)
          fmt::format(
              "set xlabel 'time since the controller started [s]'\nset ylabel 'position error of the base [mm]'\n"
              "set logscale y\nset format y '%g'\nset yrange [*:*]\nset xrange [{:.6g}:{:.6g}]\n"
-             "set key outside top center horizontal samplen 1.5 width -1\n"
+             "set key outside top center horizontal Left reverse samplen 1.5 width -1\n"
              "plot $error using 1:3 with points pt 7 ps 0.25 lc rgb '{}' title 'greatest', "
              "$error using 1:2 with points pt 7 ps 0.3 lc rgb '{}' title 'root mean square'{}\n",
              seconds(samples.front()), seconds(samples.back()), palette[5], palette[0], shade_keys(run));
@@ -190,10 +190,10 @@ std::string overview_script(const RunInfo& run, std::span<const Sample> samples)
   return head("overview", 900, 520) + depth.block("depth", mean) + force.block("force", mean) + shading(run, samples) + range +
          fmt::format(
              "set multiplot\nset lmargin at screen 0.09\nset rmargin at screen 0.98\n"
-             "set tmargin at screen 0.90\nset bmargin at screen 0.53\nset format x ''\nset ylabel 'depth of the tip [mm]'\n"
-             "set key at screen 0.535,0.98 center top horizontal samplen 1.5 width -1\nset xzeroaxis lc rgb '{0}' lt 1 lw 1\n"
+             "set tmargin at screen 0.90\nset bmargin at screen 0.55\nset format x ''\nset ylabel 'depth of the tip [mm]'\n"
+             "set key at screen 0.535,0.98 center top horizontal Left reverse samplen 1.5 width -1\nset xzeroaxis lc rgb '{0}' lt 1 lw 1\n"
              "plot $depth using 1:2 with lines lw 2 lc rgb '{1}'{2}\n"
-             "set tmargin at screen 0.48\nset bmargin at screen 0.12\nset format x '%g'\nset nokey\n"
+             "set tmargin at screen 0.50\nset bmargin at screen 0.17\nset format x '%g'\nset nokey\n"
              "set xlabel 'time since the controller started [s]'\nset ylabel 'axial force [N]'\n"
              "plot $force using 1:2 with lines lw 1.5 lc rgb '{3}'\nunset multiplot\n",
              dark, palette[0], shade_keys(run), palette[3]);
@@ -227,7 +227,7 @@ std::string histogram_script(const std::string& name, const std::string& what, s
   return head(name, 900, 360) + block + marks +
          fmt::format(
              "set xlabel '{} [µs]'\nset ylabel 'ticks'\nset logscale xy\nset format y '%g'\nset format x '%g'\nset yrange [0.7:*]\n"
-             "set style fill solid 0.75 noborder\nset key outside top center horizontal samplen 2\n"
+             "set style fill solid 0.75 noborder\nset key outside top center horizontal Left reverse samplen 2\n"
              "plot $bins using 1:4:2:3:(0.7):4 with boxxyerror lc rgb '{}'{}\n",
              what, palette[0], keys);
 }
