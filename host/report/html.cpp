@@ -1,0 +1,271 @@
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "host/report/figures.hpp"
+#include "host/report/report.hpp"
+
+namespace trocar::report {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+constexpr const char* none = "<span class=\"none\">not measured</span>";
+
+// A number in a unit, or that it was not measured.
+std::string number(double value, int digits, const char* unit) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}&nbsp;{}", value, digits, unit) : none;
+}
+std::string millimetres(double metres, int digits = 3) { return number(1e3 * metres, digits, "mm"); }
+std::string newtons(double n) { return number(n, 2, "N"); }
+std::string micrometres(double metres) { return number(1e6 * metres, 1, "µm"); }
+
+std::string row(std::initializer_list<std::string> cells) {
+  std::string out = "<tr>";
+  for (const std::string& cell : cells) out += "<td>" + cell + "</td>";
+  return out + "</tr>\n";
+}
+
+std::string table(std::initializer_list<const char*> heads, const std::string& rows) {
+  std::string out = "<div class=\"wide\"><table>\n<thead><tr>";
+  for (const char* head : heads) out += fmt::format("<th>{}</th>", head);
+  return out + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+}
+
+std::string speed(double m_s) { return fmt::format("{:.3g}&nbsp;mm/s", 1e3 * m_s); }
+
+const Insertion* insertion_at(const Summary& summary, double speed_m_s, const std::string& gains) {
+  const Insertion* found = nullptr;
+  for (const Insertion& i : summary.insertions) {
+    if (std::abs(i.speed_m_s - speed_m_s) > 1e-9) continue;
+    if (found == nullptr || (i.gain_set == gains && found->gain_set != gains)) found = &i;
+  }
+  return found;
+}
+
+std::string beside_thesis(const RunInfo& run, const Summary& summary) {
+  std::string rows;
+  const Insertion* slow = insertion_at(summary, 0.001, run.gains);
+  const auto slow_or = [&](auto&& value) {
+    return slow == nullptr ? std::string("<span class=\"none\">no insertion at 1&nbsp;mm/s</span>") : value(*slow);
+  };
+  rows += row({"Shaft force density at 1&nbsp;mm/s", "34&nbsp;N/m <small>(section 4.2, figure 4.9)</small>",
+               slow_or([](const Insertion& i) { return i.fit ? fmt::format("{:.2f}&nbsp;N/m", i.fit->slope_n_per_m) : std::string(none); }),
+               "slope of base force over depth, 20 to 65&nbsp;mm"});
+  rows += row({"Force peak at the tip, 1&nbsp;mm/s", "68&nbsp;N/m at the most distal node", slow_or([](const Insertion& i) {
+                 return i.fit ? fmt::format("{:.3f}&nbsp;N more than a uniform shaft", i.fit->intercept_n) : std::string(none);
+               }),
+               "the same line at depth 0; a base force shows the tip's total, not its density"});
+  rows += row({"Base force at full depth, 1&nbsp;mm/s", "2.3 to 2.4&nbsp;N at 70&nbsp;mm <small>(read from figure 4.10)</small>",
+               slow_or([](const Insertion& i) {
+                 return newtons(i.full_depth_force_n) + (std::isfinite(i.depth_m) ? " at " + millimetres(i.depth_m, 1) : "");
+               }),
+               "mean over the deepest 0.5&nbsp;mm"});
+  if (summary.sags.empty()) {
+    rows += row({"Sag with the thesis's gains", "F/K<sub>p</sub>: 3&nbsp;mm at 2.5&nbsp;N", none, ""});
+  }
+  for (const Sag& sag : summary.sags) {
+    rows +=
+        row({"Sag with the thesis's gains, " + escaped(sag.phase),
+             fmt::format("F/K<sub>p</sub> = {} at {}", millimetres(sag.expected_m), newtons(sag.force_n)), millimetres(sag.error_m),
+             fmt::format("K<sub>p</sub> = {:g}&nbsp;N/m; asked of the mechanism: {}, and {}/K<sub>p</sub> = {} (the difference to the base "
+                         "force is friction)",
+                         run.kp_n_per_m, newtons(sag.command_n), "that", millimetres(sag.expected_command_m))});
+  }
+  rows += row({"Resolution", "40&nbsp;µm", micrometres(summary.step_m), "median motion of the base for one count of one encoder"});
+  return table({"Quantity", "Thesis", "This run", "How it was measured"}, rows);
+}
+
+std::string insertions_table(const RunInfo& run, const Summary& summary) {
+  std::string rows;
+  for (const Insertion& i : summary.insertions) {
+    rows += row({speed(i.speed_m_s), escaped(i.gain_set.empty() ? run.gains : i.gain_set), millimetres(i.depth_m, 1),
+                 i.fit ? fmt::format("{:.2f}&nbsp;N/m", i.fit->slope_n_per_m) : none,
+                 i.fit ? fmt::format("{:.3f}&nbsp;N", i.fit->intercept_n) : none, newtons(i.full_depth_force_n),
+                 newtons(i.withdrawal_force_n), millimetres(i.insert.rms_m), millimetres(i.withdraw.rms_m)});
+  }
+  return table(
+      {"Speed", "Gains", "Depth", "Slope", "At depth 0", "Force at full depth", "Strongest pull", "Error in (rms)", "Error out (rms)"},
+      rows);
+}
+
+std::string tracking_table(const Summary& summary) {
+  std::string rows;
+  for (const GainTracking& t : summary.tracking) {
+    for (const auto& [where, tracking] : {std::pair{"air", t.air}, std::pair{"phantom", t.phantom}}) {
+      rows +=
+          row({escaped(t.gain_set), where, fmt::format("{}", tracking.ticks), millimetres(tracking.rms_m), millimetres(tracking.max_m),
+               number(tracking.rms_rad * 180.0 / std::numbers::pi, 4, "°"), number(tracking.max_rad * 180.0 / std::numbers::pi, 4, "°")});
+    }
+  }
+  return table({"Gains", "Where", "Ticks", "Position, rms", "Position, greatest", "Angle, rms", "Angle, greatest"}, rows);
+}
+
+std::string timing_table(const RunInfo& run, const Summary& summary) {
+  std::string rows;
+  const auto add = [&](const char* name, const Distribution& d) {
+    if (d.count == 0) {
+      const std::string why = run.lockstep ? "<span class=\"none\">a virtual clock has none</span>" : none;
+      rows += row({name, why, why, why});
+    } else {
+      rows += row({name, number(d.p50, 1, "µs"), number(d.p99, 1, "µs"), number(d.max, 1, "µs")});
+    }
+  };
+  add("Tick, execution time", summary.tick_us);
+  add("Wake-up, lateness", summary.wakeup_late_us);
+  return table({"", "Median", "99&nbsp;%", "Greatest"}, rows);
+}
+
+std::string counts_table(const Summary& s) {
+  std::string rows;
+  std::string faults;
+  for (const std::string& fault : s.faults) faults += (faults.empty() ? "" : ", ") + escaped(fault);
+  rows += row({"Ticks in the recording", fmt::format("{} in {:.1f}&nbsp;s", s.samples, s.duration_s)});
+  rows += row({"Lost samples", s.lost_ticks == 0 ? "none" : fmt::format("{} in {} gaps", s.lost_ticks, s.gaps)});
+  rows +=
+      row({"Ticks without complete feedback",
+           s.ticks_without_feedback == 0 ? "none"
+                                         : fmt::format("{}, at most {} in a row", s.ticks_without_feedback, s.longest_without_feedback)});
+  rows += row({"Faults", faults.empty() ? "none" : faults});
+  if (s.restarts > 0) {
+    rows += row({"Restarts of the controller", fmt::format("{}; this report shows what came after the last", s.restarts)});
+  }
+  return table({"Recording", ""}, rows);
+}
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
+}
+
+// An SVG file as part of a page: without its prolog, and with names of its own, since every file defines the same ones.
+std::string inlined(const fs::path& path, const std::string& prefix) {
+  std::ifstream in(path, std::ios::binary);
+  std::string svg{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t start = svg.find("<svg");
+  if (start == std::string::npos) throw ReportError("gnuplot wrote no figure to " + path.string());
+  svg.erase(0, start);
+  for (const char quote : {'\'', '"'}) {
+    replace_all(svg, std::string(" id=") + quote, std::string(" id=") + quote + prefix + "_");
+    replace_all(svg, std::string("href=") + quote + "#", std::string("href=") + quote + "#" + prefix + "_");
+  }
+  replace_all(svg, "url(#", "url(#" + prefix + "_");
+  return svg;
+}
+
+constexpr const char* style = R"(
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.6rem; margin-bottom: 0.2rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: 0.92rem; }
+th { text-align: left; font-weight: 600; border-bottom: 2px solid #555; } td, th { padding: 0.3rem 0.8rem 0.3rem 0; vertical-align: top; }
+td { border-bottom: 1px solid #ddd; } small, .none, figcaption, .sub { color: #666; }
+figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: 0.9rem; }
+)";
+
+std::string page(const RunInfo& run, const Summary& summary, const std::vector<Figure>& figures, const fs::path& drawn) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n"
+      "<title>Needle insertion: {0}, {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<h1>Needle insertion</h1>\n"
+      "<p class=\"sub\">Rig {0}, scene {1}, gains {3}, {4}.</p>\n",
+      escaped(run.rig), escaped(run.scene), style, escaped(run.gains), run.lockstep ? "in lock-step on a virtual clock" : "in real time");
+  const auto figure = [&](const char* file) {
+    for (const Figure& f : figures) {
+      if (f.file != file) continue;
+      out += fmt::format("<figure>\n{}\n<figcaption><b>{}.</b> {}</figcaption>\n</figure>\n",
+                         inlined(drawn / f.file, fs::path(f.file).stem().string()), f.title, f.caption);
+    }
+  };
+  figure("force_depth.svg");
+  out += "<h2>Beside the thesis</h2>\n" + beside_thesis(run, summary);
+  out += "<h2>Insertions</h2>\n" + insertions_table(run, summary);
+  out += "<h2>Tracking</h2>\n" + tracking_table(summary);
+  figure("tracking.svg");
+  out += "<h2>Course of the run</h2>\n";
+  figure("overview.svg");
+  out += "<h2>Timing</h2>\n" + timing_table(run, summary);
+  figure("tick_time.svg");
+  figure("wakeup.svg");
+  out += "<h2>Completeness</h2>\n" + counts_table(summary);
+  if (!run.notes.empty()) {
+    out += "<h2>Notes</h2>\n<ul>\n";
+    for (const std::string& note : run.notes) out += "<li>" + escaped(note) + "</li>\n";
+    out += "</ul>\n";
+  }
+  return out +
+         "<p class=\"sub\">Every number of this run was computed from its samples (capture.mcap, samples.csv). Thesis: S. P. DiMaio, "
+         "Modelling, Simulation and Planning of Needle Motion in Soft Tissues, University of British Columbia, "
+         "2003.</p>\n</body>\n</html>\n";
+}
+
+// A folder beside the results that goes away with what was not renamed out of it.
+class Scratch {
+ public:
+  explicit Scratch(const fs::path& parent) {
+    std::string name = (parent / ".report-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw ReportError("cannot write into " + parent.string() + ": " + std::strerror(errno) +
+                        "; choose a run folder that exists and that you may write to");
+    }
+    path_ = name;
+  }
+  ~Scratch() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace
+
+void write_report(const RunInfo& run, const Summary& summary, std::span<const Sample> all) {
+  const Scratch scratch(run.folder);
+  const auto figures = draw_figures(run, summary, after_last_restart(all), scratch.path());
+  {
+    std::ofstream file(scratch.path() / "report.html", std::ios::binary);
+    file << page(run, summary, figures, scratch.path());
+    if (!file.flush()) throw ReportError("cannot write " + (run.folder / "report.html").string() + ": free some space");
+  }
+  try {
+    fs::create_directories(run.folder / "figures");
+    for (const Figure& figure : figures) fs::rename(scratch.path() / figure.file, run.folder / "figures" / figure.file);
+    fs::rename(scratch.path() / "report.html", run.folder / "report.html");
+  } catch (const fs::filesystem_error& error) {
+    throw ReportError(std::string("cannot write the report: ") + error.what());
+  }
+}
+
+}  // namespace trocar::report

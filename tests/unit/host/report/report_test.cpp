@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "made_up_run.hpp"
+
+namespace {
+
+using namespace trocar;
+using namespace trocar::report;
+
+std::string slurp(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::size_t entries(const std::filesystem::path& path) {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path), {}));
+}
+
+class ReportTest : public testing::Test {
+ protected:
+  ReportTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "trocar_report_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~ReportTest() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path folder_;
+};
+
+TEST_F(ReportTest, PageStandsAloneAndHoldsTheNumbersOfTheRun) {
+  auto run = made_up::make();
+  run.info.folder = folder_;
+  const Summary s = summarise(run.info, run.samples);
+  write_report(run.info, s, run.samples);
+  const std::string page = slurp(folder_ / "report.html");
+  for (const char* text : {"34.00&nbsp;N/m", "42.00&nbsp;N/m", "68&nbsp;N/m", "2.3 to 2.4&nbsp;N", "40&nbsp;µm", "-1.50&nbsp;N", "ubc_twin",
+                           "made up &lt;by&gt; a test &amp; nothing else", "thesis dwell"}) {
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  }
+  // Five figures inside, nothing fetched from outside, no script, no name used twice, and every reference has its target.
+  std::size_t figures = 0;
+  for (std::size_t at = 0; (at = page.find("<svg", at)) != std::string::npos; ++at) ++figures;
+  EXPECT_EQ(figures, 5u);
+  EXPECT_FALSE(std::regex_search(page, std::regex("<script|<link|<img|src=|@import")));
+  std::set<std::string> names;
+  const std::regex id("\\sid=['\"]([^'\"]+)['\"]");
+  for (std::sregex_iterator it(page.begin(), page.end(), id), end; it != end; ++it) EXPECT_TRUE(names.insert((*it)[1]).second) << (*it)[1];
+  const std::regex reference("(?:href=['\"]|url\\()#([^'\")]+)");
+  std::size_t references = 0;
+  for (std::sregex_iterator it(page.begin(), page.end(), reference), end; it != end; ++it, ++references) {
+    EXPECT_TRUE(names.contains((*it)[1])) << (*it)[1];
+  }
+  EXPECT_GT(references, 0u);
+  EXPECT_EQ(entries(folder_ / "figures"), 5u);
+  EXPECT_EQ(entries(folder_), 2u) << "no temporary may stay";
+}
+
+TEST_F(ReportTest, SecondReportReplacesTheFirst) {
+  auto run = made_up::make();
+  run.info.folder = folder_;
+  const Summary s = summarise(run.info, run.samples);
+  write_report(run.info, s, run.samples);
+  const std::string first = slurp(folder_ / "report.html");
+  write_report(run.info, s, run.samples);
+  EXPECT_EQ(slurp(folder_ / "report.html"), first);
+}
+
+TEST_F(ReportTest, LockstepRunHasNoTimesAndNoHistograms) {
+  auto run = made_up::make();
+  run.info.folder = folder_;
+  run.info.lockstep = true;
+  write_report(run.info, summarise(run.info, run.samples), run.samples);
+  EXPECT_NE(slurp(folder_ / "report.html").find("a virtual clock has none"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "figures/tick_time.svg"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "figures/force_depth.svg"));
+}
+
+TEST_F(ReportTest, EmptyRunStillGetsAPageThatSaysSo) {
+  RunInfo info;
+  info.folder = folder_;
+  write_report(info, summarise(info, {}), {});
+  EXPECT_NE(slurp(folder_ / "report.html").find("not measured"), std::string::npos);
+}
+
+TEST_F(ReportTest, MissingGnuplotAndUnwritableFolderAreOneSentenceWithARemedy) {
+  auto run = made_up::make();
+  run.samples.resize(5000);
+  run.info.folder = folder_;
+  const Summary s = summarise(run.info, run.samples);
+  const std::string path = getenv("PATH");
+  setenv("PATH", "/nonexistent", 1);
+  std::string text;
+  try {
+    write_report(run.info, s, run.samples);
+  } catch (const ReportError& error) {
+    text = error.what();
+  }
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(text.find("gnuplot, which is not installed: apt-get install"), std::string::npos) << text;
+  EXPECT_EQ(entries(folder_), 0u) << "nothing half-written";
+
+  run.info.folder = folder_ / "missing";
+  try {
+    write_report(run.info, s, run.samples);
+    FAIL() << "no error";
+  } catch (const ReportError& error) {
+    EXPECT_NE(std::string_view(error.what()).find("missing"), std::string_view::npos) << error.what();
+  }
+}
+
+TEST(Json, HoldsTheNumbersAndNullForWhatWasNotMeasured) {
+  auto run = made_up::make();
+  run.info.scene = "a \"quoted\"\nname";
+  Summary s = summarise(run.info, run.samples);
+  s.insertions.resize(1);
+  s.insertions[0].fit->slope_n_per_m = 0.1;
+  const std::string json = to_json(run.info, s);
+  EXPECT_NE(json.find("\"slope_n_per_m\": 0.1,"), std::string::npos) << json;
+  EXPECT_NE(json.find("\"step_m\": null"), std::string::npos) << json;
+  EXPECT_NE(json.find("\"scene\": \"a \\\"quoted\\\"\\u000aname\""), std::string::npos) << json;
+  // Balanced outside of texts, and not a trace of a number that JSON does not have.
+  long depth = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    if (json[i] == '"' && (i == 0 || json[i - 1] != '\\')) in_text = !in_text;
+    if (in_text) continue;
+    if (json[i] == '{' || json[i] == '[') ++depth;
+    if (json[i] == '}' || json[i] == ']') --depth;
+  }
+  EXPECT_EQ(depth, 0);
+  EXPECT_EQ(json.find("nan"), std::string::npos);
+}
+
+}  // namespace
