@@ -172,6 +172,21 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
   return To::Other;
 }
 
+void print_summary(const report::Summary& s) {
+  for (const auto& i : s.insertions)
+    fmt::print("{:<34} force at depth {:6.3f} N, slope {:5.1f} N/m, tracking RMS {:.3f} mm\n", i.name, i.full_depth_force_n,
+               i.fit ? i.fit->slope_n_per_m : report::not_measured, 1e3 * i.insert.rms_m);
+  for (const auto& g : s.tracking)
+    fmt::print("gains {:<28} tracking RMS {:.3f} mm in the air, {:.3f} mm in the phantom\n", g.gain_set, 1e3 * g.air.rms_m, 1e3 * g.phantom.rms_m);
+  for (const auto& g : s.sags)
+    fmt::print("sag, {:<29} {:.2f} mm at {:.2f} N; F/Kp is {:.2f} mm\n", g.phase, 1e3 * g.error_m, g.force_n, 1e3 * g.expected_m);
+  if (s.tick_us.count > 0)
+    fmt::print("tick p50 {:.0f} us, p99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us\n", s.tick_us.p50, s.tick_us.p99, s.wakeup_late_us.p50,
+               s.wakeup_late_us.p99);
+  fmt::print("{} samples, {} lost, {} ticks without feedback, faults: {}\n", s.samples, s.lost_ticks, s.ticks_without_feedback,
+             s.faults.empty() ? "none" : fmt::format("{}", fmt::join(s.faults, ", ")));
+}
+
 }  // namespace
 
 int make_report(const std::filesystem::path& folder, bool json) {
@@ -187,15 +202,22 @@ int make_report(const std::filesystem::path& folder, bool json) {
   info.needle_length_m = run.placement.needle_length_m;
   info.kp_n_per_m = run.thesis_stiffness_n_per_m;
   info.notes = run.notes;
-  for (const auto& p : run.phases) info.phases.push_back({p.name, report_kind(p.kind), p.speed_m_s, p.gain_set, p.first_tick, p.last_tick});
+  info.gains = run.phases.empty() ? "" : run.phases.front().gain_set;
+  double insertion_speed_m_s = 0.0;  // a withdrawal belongs to the insertion before it, whatever its own speed
+  for (const auto& p : run.phases) {
+    if (p.kind == experiment::PhaseKind::Insert) insertion_speed_m_s = p.speed_m_s;
+    const bool back = p.kind == experiment::PhaseKind::Withdraw && insertion_speed_m_s > 0.0;
+    info.phases.push_back({p.name, report_kind(p.kind), back ? insertion_speed_m_s : p.speed_m_s, p.gain_set, p.first_tick, p.last_tick});
+  }
   if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
   if (run.lockstep) info.notes.push_back(fmt::format("{:.1f} s simulated in {:.1f} s, {:.1f} times real time", run.simulated_s, run.wall_s, run.simulated_s / run.wall_s));
   const report::Summary summary = report::summarise(info, log.samples);
   report::write_report(info, summary, log.samples);
   if (json) {
-    fmt::print("{}\n", report::to_json(summary));
+    fmt::print("{}\n", report::to_json(info, summary));
   } else {
-    fmt::print("{}report: {}\n", report::to_text(summary), (folder / "report.html").string());
+    print_summary(summary);
+    fmt::print("report: {}\n", (folder / "report.html").string());
   }
   return 0;
 }
