@@ -53,8 +53,9 @@ void write_run(const std::filesystem::path& folder, const Run& run) {
   s += fmt::format("experiment = {}\nrig = {}\nscene = {}\nlockstep = {}\n", quoted(run.experiment), quoted(run.rig), quoted(run.scene), run.lockstep);
   s += fmt::format("surface_y_m = {:.17g}\ncentre_x_m = {:.17g}\nneedle_length_m = {:.17g}\n", run.placement.surface_y_m, run.placement.centre_x_m,
                    run.placement.needle_length_m);
-  s += fmt::format("thesis_stiffness_n_per_m = {:.17g}\nsimulated_s = {:.17g}\nwall_s = {:.17g}\ncompleted = {}\noutcome = {}\n",
-                   run.thesis_stiffness_n_per_m, run.simulated_s, run.wall_s, run.completed, quoted(run.outcome));
+  s += fmt::format("thesis_stiffness_n_per_m = {:.17g}\nsimulated_s = {:.17g}\nwall_s = {:.17g}\ncompleted = {}\n",
+                   run.thesis_stiffness_n_per_m, run.simulated_s, run.wall_s, run.completed);
+  if (!run.outcome.empty()) s += fmt::format("outcome = {}\n", quoted(run.outcome));
   for (const auto& note : run.notes) s += fmt::format("\n[[note]]\ntext = {}\n", quoted(note));
   for (const Phase& p : run.phases)
     s += fmt::format("\n[[phase]]\nname = {}\nkind = \"{}\"\nspeed_m_s = {:.17g}\ngain_set = {}\nfirst_tick = {}\nlast_tick = {}\n", quoted(p.name),

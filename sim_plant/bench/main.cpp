@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <string>
@@ -91,7 +92,7 @@ int run(const Options& options) {
     }
     sequencer.on_sample(bench.sample());
     for (const Reply& r : replies) sequencer.on_reply(r);
-    if (options.progress && ++ticks % 500 == 0)
+    if (options.progress && ++ticks % 500 == 0 && std::isfinite(bench.sample().pose[1]))
       fmt::print(stderr, "progress {:.4f} {:.3f} {:.4f} {} {}\n", sequencer.progress(), 1e3 * sequencer.tip_depth_m(bench.sample()),
                  bench.sample().base_wrench[1], to_string(bench.sample().mode), sequencer.phase_name());
   }

@@ -114,14 +114,14 @@ int run(const Options& options) {
     std::array<char, 256> line{};
     rt::describe(item, outcome, line);
     if (outcome.asked && !outcome.obtained) fmt::print(stderr, "trocar-rig: {}\n", line.data());
-    if (outcome.asked && !outcome.obtained && item != rt::Item::Kernel) missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
+    if (outcome.asked && !outcome.obtained) missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
   }
-  if (!setup.complete() && !options.best_effort)
-    throw config::UserError("the real-time set-up is incomplete (above): run as root or with the capabilities sys_nice and ipc_lock, "
-                            "or add --best-effort when no motor is connected");
+  const bool real_time = setup.complete() && setup.outcome(rt::Item::Kernel).obtained;
+  if (!real_time && !options.best_effort)
+    throw config::UserError("the real-time set-up is incomplete (above): mend that, or add --best-effort when no motor is connected");
 
-  controller::Controller controller(p.rig, p.mail, setup.complete());
-  bridge.report_real_time(setup.complete(), missing);
+  controller::Controller controller(p.rig, p.mail, real_time);
+  bridge.report_real_time(real_time, missing);
   fmt::print("trocar-rig: {} at {:g} Hz, DDS domain {}, {}\n", p.rig.name.data(), p.rig.timing.tick_hz, p.rig.dds_domain,
              setup.complete() ? "real-time set-up complete" : "best effort");
   std::fflush(stdout);
