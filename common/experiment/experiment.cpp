@@ -51,7 +51,7 @@ Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, c
       add_move(PhaseKind::Touch, "touch", x, 0.5 * e.standoff_m, e.touch_speed_m_s, e.touch_force_n);
       steps_.back().may_stop_early = steps_.back().must_stop_early = true;
       steps_.back().expected_s = e.standoff_m / e.touch_speed_m_s;
-      add_move(PhaseKind::Withdraw, "back from touch", x, -e.standoff_m, e.withdraw_speed_m_s);
+      add_move(PhaseKind::Touch, "back from touch", x, -e.standoff_m, e.withdraw_speed_m_s);
     }
     add_insertion(fmt::format("{:g} mm/s", 1e3 * v), x, v);
   }
