@@ -118,7 +118,7 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
     rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain), "--best-effort", "--die-with-parent"});
     rig->wait_for_line("DDS domain", ready_s);
   }
-  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain)});
+  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain), "--die-with-parent"});
   recorder->wait_for_line("recording to", ready_s);
 
   ProgressLine line;
@@ -129,6 +129,8 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
     line.end();
     recorder->signal(SIGINT);
     recorder->wait(end_s);
+    std::error_code ignored;
+    std::filesystem::remove(out / "capture.mcap", ignored);  // nothing was run: a recording of it would be half a result
     throw;
   }
   line.end();
