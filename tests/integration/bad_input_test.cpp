@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Mistake{"NotANumber", "base_m = 0.08", "base_m = nan", {"base_m"}},
                       Mistake{"ImpossibleGeometry", "base_m = 0.08", "base_m = 0.9", {"base_m", "cannot reach each other", "closer"}},
                       Mistake{"WrongUnit", "base_m = 0.08", "base_mm = 80", {"base_mm", "base_m = 0.08"}}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& one) { return std::string(one.param.name); });
 
 TEST(BadInput, MissingFilesAreNamed) {
   const Scratch scratch;
