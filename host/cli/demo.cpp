@@ -195,9 +195,11 @@ int make_report(const std::filesystem::path& folder, bool json) {
   const report::Summary summary = report::summarise(info, log.samples);
   report::write_report(info, summary, log.samples);
   if (json) {
-    fmt::print("{}\n", report::to_json(summary));
+    fmt::print("{}\n", report::to_json(info, summary));
   } else {
-    fmt::print("{}report: {}\n", report::to_text(summary), (folder / "report.html").string());
+    for (const auto& t : summary.tracking)
+      fmt::print("{} gains: position error RMS {:.3f} mm in the air, {:.3f} mm in the phantom\n", t.gain_set, 1e3 * t.air.rms_m, 1e3 * t.phantom.rms_m);
+    fmt::print("report: {}\n", (folder / "report.html").string());
   }
   return 0;
 }
