@@ -42,14 +42,14 @@ constexpr std::int64_t longest_step_ns = 5'000'000;
 
 int run(const Options& options) {
   const auto rig_file = config::find_share("rigs", options.rig);
-  const rig::Rig rig = config::read_rig(rig_file);
+  const rig::Rig rig = config::read_twin(rig_file);
   const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
   const auto phantom = sim_plant::phantom_config(config::read_scene(config::find_share("scenes", options.scene)));
   hal::EndpointBus drives;
   hal::EndpointBus sensor;
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
     const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Plant);
-    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", rig_file.string(), name, status.message.data()));
+    if (status.error_number != 0) config::refuse_bus(rig_file, name, "plant_port", status.message.data());
   };
   open(drives, rig.buses.drives, "drives");
   open(sensor, rig.buses.sensor, "sensor");

@@ -47,7 +47,7 @@ class Kill : public ::testing::Test {
   void SetUp() override {
     rig_file = scratch.make_rig().string();
     plant.emplace(scratch, "trocar-plant", std::vector<std::string>{"--rig", rig_file, "--log-drives"});
-    ASSERT_TRUE(plant->wait_for("trocar-plant: ", start_s)) << plant->errors();
+    ASSERT_TRUE(plant->wait_for("before scene", start_s)) << plant->errors();
     rig.emplace(scratch, "trocar-rig", std::vector<std::string>{"--rig", rig_file, "--domain", domain, "--best-effort"});
     ASSERT_TRUE(rig->wait_for("DDS domain", start_s)) << rig->errors();
     recorder.emplace(scratch, "trocar", std::vector<std::string>{"record", "--out", capture_file.string(), "--domain", domain});

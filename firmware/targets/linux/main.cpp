@@ -91,15 +91,12 @@ void run_loop(Process& p, controller::Controller& controller) {
 
 int run(const Options& options) {
   const auto path = config::find_share("rigs", options.rig);
-  auto process = std::make_unique<Process>(config::read_rig(path));
+  auto process = std::make_unique<Process>(config::read_twin(path));
   Process& p = *process;
   if (options.domain >= 0) p.rig.dds_domain = static_cast<std::uint32_t>(options.domain);
-  if (p.rig.kind != rig::Kind::Twin)
-    throw config::UserError(fmt::format("{}: kind = single: the controller moves a handle in x, y and rotation, which needs a twin; "
-                                        "use ubc_twin, or look at this rig with: trocar rig info {}", path.string(), options.rig));
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
     const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig);
-    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", path.string(), name, status.message.data()));
+    if (status.error_number != 0) config::refuse_bus(path, name, "rig_port", status.message.data());
   };
   open(p.drives, p.rig.buses.drives, "drives");
   open(p.sensor, p.rig.buses.sensor, "sensor");
