@@ -113,8 +113,7 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
                                              "--die-with-parent"};
     if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
     plant.emplace("trocar-plant", plant_arguments);
-    plant->wait_for_line("trocar-plant: ", ready_s);
-    if (!plant->running()) throw config::UserError(plant->output());
+    plant->wait_for_line("before scene", ready_s);
     rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain), "--best-effort", "--die-with-parent"});
     rig->wait_for_line("DDS domain", ready_s);
   }
