@@ -342,4 +342,18 @@ Rig read_rig(const std::filesystem::path& file) {
   return rig;
 }
 
+Rig read_twin(const std::filesystem::path& file) {
+  const Rig rig = read_rig(file);
+  if (rig.kind != Kind::Twin) {
+    Document::load(file).root().fail("kind", fmt::format("a handle that moves in x, y and rotation needs a twin; take ubc_twin, or look "
+                                                         "at this rig with: trocar rig info {}", file.string()));
+  }
+  return rig;
+}
+
+void refuse_bus(const std::filesystem::path& file, std::string_view bus, std::string_view port_key, std::string_view problem) {
+  const Table table = Document::load(file).root().table("buses").table(bus);
+  table.fail(table.has("interface") ? "interface" : port_key, problem);
+}
+
 }  // namespace trocar::config

@@ -14,11 +14,16 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "common/rig/rig.hpp"
 
 namespace trocar::config {
 
 [[nodiscard]] rig::Rig read_rig(const std::filesystem::path& file);
+// The same, and refuses a single linkage: controller, plant and experiments move a handle in x, y and rotation.
+[[nodiscard]] rig::Rig read_twin(const std::filesystem::path& file);
+// For a bus that the system would not open: names the line of its interface or, if it has none, of `port_key`.
+[[noreturn]] void refuse_bus(const std::filesystem::path& file, std::string_view bus, std::string_view port_key, std::string_view problem);
 
 }  // namespace trocar::config

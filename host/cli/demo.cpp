@@ -114,12 +114,11 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
                                              "--die-with-parent"};
     if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
     plant.emplace("trocar-plant", plant_arguments);
-    plant->wait_for_line("trocar-plant: ", ready_s);
-    if (!plant->running()) throw config::UserError(plant->output());
+    plant->wait_for_line("before scene", ready_s);
     rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain), "--best-effort", "--die-with-parent"});
     rig->wait_for_line("DDS domain", ready_s);
   }
-  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain)});
+  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain), "--die-with-parent"});
   recorder->wait_for_line("recording to", ready_s);
 
   ProgressLine line;
@@ -130,6 +129,8 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
     line.end();
     recorder->signal(SIGINT);
     recorder->wait(end_s);
+    std::error_code ignored;
+    std::filesystem::remove(out / "capture.mcap", ignored);  // nothing was run: a recording of it would be half a result
     throw;
   }
   line.end();
@@ -177,10 +178,13 @@ void print_summary(const report::Summary& s) {
   for (const auto& i : s.insertions)
     fmt::print("{:<34} force at depth {:6.3f} N, slope {:5.1f} N/m, tracking RMS {:.3f} mm\n", i.name, i.full_depth_force_n,
                i.fit ? i.fit->slope_n_per_m : report::not_measured, 1e3 * i.insert.rms_m);
-  for (const auto& g : s.tracking)
-    fmt::print("gains {:<28} tracking RMS {:.3f} mm in the air, {:.3f} mm in the phantom\n", g.gain_set, 1e3 * g.air.rms_m, 1e3 * g.phantom.rms_m);
+  for (const auto& g : s.tracking) {
+    if (g.air.ticks > 0) fmt::print("tracking RMS in the air, {:<9} {:.3f} mm\n", g.gain_set, 1e3 * g.air.rms_m);
+    if (g.phantom.ticks > 0) fmt::print("tracking RMS in phantom, {:<9} {:.3f} mm\n", g.gain_set, 1e3 * g.phantom.rms_m);
+  }
   for (const auto& g : s.sags)
-    fmt::print("sag, {:<29} {:.2f} mm at {:.2f} N; F/Kp is {:.2f} mm\n", g.phase, 1e3 * g.error_m, g.force_n, 1e3 * g.expected_m);
+    fmt::print("sag, {:<29} {:.2f} mm; F/Kp is {:.2f} mm for the {:.2f} N at the base, {:.2f} mm with the friction of the mechanism\n", g.phase, 1e3 * g.error_m,
+               1e3 * g.expected_m, g.force_n, 1e3 * g.expected_command_m);
   if (s.tick_us.count > 0)
     fmt::print("tick p50 {:.0f} us, p99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us\n", s.tick_us.p50, s.tick_us.p99, s.wakeup_late_us.p50,
                s.wakeup_late_us.p99);

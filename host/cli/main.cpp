@@ -1,6 +1,7 @@
 // trocar: the host's command line.
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <sys/prctl.h>
 
 #include <atomic>
 #include <csignal>
@@ -70,8 +71,11 @@ int main(int argc, char** argv) {
   host::RecordOptions record;
   record_command->add_option("--out", record.out, "a file that ends in .mcap, or a folder")->required();
   record_command->add_option("--rig", rig, "rig whose DDS domain to listen to")->capture_default_str();
+  bool die_with_parent = false;
+  record_command->add_flag("--die-with-parent", die_with_parent, "stop orderly when the process that started this one ends");
   with_domain(record_command);
   record_command->callback([&] {
+    if (die_with_parent) prctl(PR_SET_PDEATHSIG, SIGTERM);
     record.domain = domain_of();
     record.say = [](const std::string& line) {
       fmt::print("{}\n", line);

@@ -30,9 +30,7 @@ ExperimentSetup read_setup(const std::string& name, const std::vector<double>& s
   s.experiment = experiment::read_experiment(config::find_share("experiments", name));
   if (!speeds_m_s.empty()) s.experiment.speeds_m_s = speeds_m_s;
   s.rig_file = config::find_share("rigs", s.experiment.rig);
-  s.rig = config::read_rig(s.rig_file);
-  if (s.rig.kind != rig::Kind::Twin)
-    throw config::UserError(fmt::format("{}: kind = single: an experiment moves a needle in x, y and rotation; use a twin such as ubc_twin", s.rig_file.string()));
+  s.rig = config::read_twin(s.rig_file);
   s.scene_file = config::find_share("scenes", s.experiment.scene);
   const config::SceneFile scene = config::read_scene(s.scene_file);
   s.placement = {scene.tissue.grid.origin_m[1], scene.tissue.grid.origin_m[0] + 0.5 * scene.tissue.grid.size_m[0], scene.needle.length_m};

@@ -27,6 +27,7 @@ class TrackingSum {
   void add(const Sample& s) noexcept {
     const double position = std::hypot(s.setpoint_pose[0] - s.pose[0], s.setpoint_pose[1] - s.pose[1]);
     const double angle = std::abs(s.setpoint_pose[2] - s.pose[2]);
+    if (!std::isfinite(position) || !std::isfinite(angle)) return;  // no reference: the position was not controlled
     ++ticks_;
     square_m_ += position * position;
     square_rad_ += angle * angle;

@@ -47,7 +47,7 @@ int run(const Options& options) {
     e.speeds_m_s.clear();
     for (const double v : options.speeds_mm_s) e.speeds_m_s.push_back(1e-3 * v);
   }
-  const rig::Rig rig = config::read_rig(config::find_share("rigs", e.rig));
+  const rig::Rig rig = config::read_twin(config::find_share("rigs", e.rig));
   const config::SceneFile scene = config::read_scene(config::find_share("scenes", e.scene));
   const experiment::Placement placement{scene.tissue.grid.origin_m[1], scene.tissue.grid.origin_m[0] + 0.5 * scene.tissue.grid.size_m[0],
                                         scene.needle.length_m};

@@ -42,14 +42,14 @@ constexpr std::int64_t longest_step_ns = 5'000'000;
 
 int run(const Options& options) {
   const auto rig_file = config::find_share("rigs", options.rig);
-  const rig::Rig rig = config::read_rig(rig_file);
+  const rig::Rig rig = config::read_twin(rig_file);
   const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
   const auto phantom = sim_plant::phantom_config(config::read_scene(config::find_share("scenes", options.scene)));
   hal::EndpointBus drives;
   hal::EndpointBus sensor;
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
     const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Plant);
-    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", rig_file.string(), name, status.message.data()));
+    if (status.error_number != 0) config::refuse_bus(rig_file, name, "plant_port", status.message.data());
   };
   open(drives, rig.buses.drives, "drives");
   open(sensor, rig.buses.sensor, "sensor");
@@ -61,6 +61,7 @@ int run(const Options& options) {
   std::int64_t wall_ns = rt::monotonic_now_ns();
   std::int64_t now_ns = 0;  // the plant's own clock
   std::uint64_t starved = 0;
+  std::int64_t heard_ns = 0;  // when the controller's last frame for the drives came
   std::array<hal::canopen::DriveState, sim_plant::WiredPlant::drives> known{};
   hal::CanFrame frame;
   while (!stop_asked.load()) {
@@ -70,8 +71,10 @@ int run(const Options& options) {
     now_ns += std::min(wall - wall_ns, longest_step_ns);
     wall_ns = wall;
     plant->advance(now_ns);
-    while (drives.receive(frame, now_ns))
+    while (drives.receive(frame, now_ns)) {
+      heard_ns = now_ns;
       for (std::size_t i = 0; i < plant->drives; ++i) plant->drive_receives(i, frame, now_ns);
+    }
     while (sensor.receive(frame, now_ns)) plant->sensor_receives(frame, now_ns);
     for (std::size_t i = 0; i < plant->drives; ++i)
       while (plant->drive_transmits(i, frame)) drives.send(frame, now_ns);
@@ -82,8 +85,9 @@ int run(const Options& options) {
     for (std::size_t i = 0; i < plant->drives; ++i) {
       if (plant->drive(i).state() == known[i]) continue;
       known[i] = plant->drive(i).state();
-      fmt::print("drive {} {} at {:.1f} ms, motor torque {:g} N m\n", i + 1, hal::canopen::to_string(known[i]), 1e-6 * static_cast<double>(now_ns),
-                 plant->drive(i).motor_torque_nm());
+      fmt::print("drive {} {} at {:.1f} ms, motor torque {:g} N m, {:.1f} ms after the controller's last frame\n", i + 1,
+                 hal::canopen::to_string(known[i]), 1e-6 * static_cast<double>(now_ns), plant->drive(i).motor_torque_nm(),
+                 1e-6 * static_cast<double>(now_ns - heard_ns));
       std::fflush(stdout);
     }
   }
@@ -103,7 +107,7 @@ int main(int argc, char** argv) {
   app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
   app.add_option("--plant", options.plant, "plant name (how the machine differs from its rig file), or path")->capture_default_str();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
-  app.add_flag("--log-drives", options.log_drives, "print every change of a drive's state, with the plant's time");
+  app.add_flag("--log-drives", options.log_drives, "print every change of a drive's state, with the plant's time, torque and the controller's silence");
   app.add_flag("--die-with-parent", die_with_parent, "stop when the process that started this one ends");
   try {
     app.parse(argc, argv);

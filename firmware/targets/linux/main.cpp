@@ -91,15 +91,12 @@ void run_loop(Process& p, controller::Controller& controller) {
 
 int run(const Options& options) {
   const auto path = config::find_share("rigs", options.rig);
-  auto process = std::make_unique<Process>(config::read_rig(path));
+  auto process = std::make_unique<Process>(config::read_twin(path));
   Process& p = *process;
   if (options.domain >= 0) p.rig.dds_domain = static_cast<std::uint32_t>(options.domain);
-  if (p.rig.kind != rig::Kind::Twin)
-    throw config::UserError(fmt::format("{}: kind = single: the controller moves a handle in x, y and rotation, which needs a twin; "
-                                        "use ubc_twin, or look at this rig with: trocar rig info {}", path.string(), options.rig));
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
     const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig);
-    if (status.error_number != 0) throw config::UserError(fmt::format("{}: [buses.{}]: {}", path.string(), name, status.message.data()));
+    if (status.error_number != 0) config::refuse_bus(path, name, "rig_port", status.message.data());
   };
   open(p.drives, p.rig.buses.drives, "drives");
   open(p.sensor, p.rig.buses.sensor, "sensor");
@@ -116,6 +113,7 @@ int run(const Options& options) {
     if (outcome.asked && !outcome.obtained) fmt::print(stderr, "trocar-rig: {}\n", line.data());
     if (outcome.asked && !outcome.obtained) missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
   }
+  // Root on a stock kernel is granted the rest and still wakes up some ms late: without PREEMPT_RT the best-effort limit judges.
   const bool real_time = setup.complete() && setup.outcome(rt::Item::Kernel).obtained;
   if (!real_time && !options.best_effort)
     throw config::UserError("the real-time set-up is incomplete (above): mend that, or add --best-effort when no motor is connected");
@@ -123,7 +121,7 @@ int run(const Options& options) {
   controller::Controller controller(p.rig, p.mail, real_time);
   bridge.report_real_time(real_time, missing);
   fmt::print("trocar-rig: {} at {:g} Hz, DDS domain {}, {}\n", p.rig.name.data(), p.rig.timing.tick_hz, p.rig.dds_domain,
-             setup.complete() ? "real-time set-up complete" : "best effort");
+             real_time ? "real-time set-up complete" : "best effort");
   std::fflush(stdout);
   run_loop(p, controller);
   fmt::print("trocar-rig: stopped in mode {}\n", to_string(controller.status().mode));
