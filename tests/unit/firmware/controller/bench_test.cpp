@@ -14,14 +14,14 @@
 namespace trocar::sim_plant {
 namespace {
 
-struct Run {
+struct LockStep {
   std::filesystem::path share{TROCAR_SHARE};
   rig::Rig rig = config::read_rig(share / "rigs/ubc_twin.toml");
   Bench bench;
   std::vector<Sample> samples;
   std::vector<Reply> replies;
 
-  explicit Run(std::uint64_t seed)
+  explicit LockStep(std::uint64_t seed)
       : bench(rig, read_plant(share / "plants/ubc_twin.toml"), phantom_config(config::read_scene(share / "scenes/phantom.toml")), seed) {}
 
   void tick(int n) {
@@ -51,7 +51,7 @@ struct Run {
 
 // In the air, below the face of the tissue: 20 mm there at 10 mm/s.
 TEST(ClosedLoop, TracksWithinATenthOfAMillimetreInTheAir) {
-  Run r(1);
+  LockStep r(1);
   r.arm();
   ASSERT_EQ(r.bench.sample().mode, Mode::Armed);
   const auto from = r.bench.sample().pose;
@@ -82,7 +82,7 @@ bool same(const Sample& a, const Sample& b) {
 
 TEST(ClosedLoop, SameSeedGivesTheSameBitsAndAnotherDoesNot) {
   const auto run = [](std::uint64_t seed) {
-    Run r(seed);
+    LockStep r(seed);
     r.arm();
     r.send({.kind = CommandKind::Move, .target_pose = {0.0, 0.13, 1.6}, .speed_m_s = 0.05, .angular_speed_rad_s = 1.0}, 800);
     return std::move(r.samples);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
 
 #include "fake_rig.hpp"
 
@@ -144,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"Saturated", Fault::SensorSaturated, [](FakeRig& f) { f.feedback.sensor.saturated = true; }},
                       Case{"Force", Fault::ForceLimit, [](FakeRig& f) { f.feedback.sensor.force_torque[0] = 10.01; }},
                       Case{"Moment", Fault::ForceLimit, [](FakeRig& f) { f.feedback.sensor.force_torque[5] = -0.101; }}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& c) { return std::string(c.param.name); });
 
 TEST(ControllerFaults, LateUpToTheLimitIsBorne) {
   FakeRig f;
