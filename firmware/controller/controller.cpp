@@ -66,7 +66,7 @@ void Controller::acquire(const TickInput& input) noexcept {
     bool still = true;
     for (std::size_t i = 0; i < rig_.drives(); ++i) {
       counts_[i] = link_.drive[i].position_counts;
-      still = still && std::abs(counts_[i] - rest_counts_[i]) <= rest_counts;
+      still = still && std::abs(std::int64_t{counts_[i]} - rest_counts_[i]) <= rest_counts;
     }
     if (still) {
       if (rest_ticks_ < rest_ticks_needed) ++rest_ticks_;
@@ -120,7 +120,8 @@ void Controller::observe_force() noexcept {
   const double c = std::cos(state_.x[2]);
   const double s = std::sin(state_.x[2]);
   base_wrench_ = {c * w[0] - s * w[1], s * w[0] + c * w[1], w[2]};
-  load_ += (1.0 - std::exp(-load_bandwidth_rad_s * dt_s_)) * (base_wrench_ - load_);
+  // One NaN would stay in a low-pass for ever; that it came is told by base_wrench_.
+  if (base_wrench_.allFinite()) load_ += (1.0 - std::exp(-load_bandwidth_rad_s * dt_s_)) * (base_wrench_ - load_);
 }
 
 void Controller::take_commands() noexcept {
@@ -135,13 +136,13 @@ void Controller::execute(const Command& command) noexcept {
   switch (command.kind) {
     case CommandKind::KeepAlive: return;  // answered by silence: it comes fifty times a second
     case CommandKind::Stop:
-      if (position_controlled() && fault_ == Fault::None) {
+      if (position_controlled()) {
         motion_end_ = ReplyCode::Stopped;
         motion_.brake(rig_.limits);
         stopping_ = true;
       } else if (fault_ == Fault::None) {
-        arm_command_ = {};
         raise(Trigger::TorqueOffAsked);
+        forget_session();
       }
       code = ReplyCode::Done;
       break;
@@ -173,6 +174,7 @@ void Controller::execute(const Command& command) noexcept {
         code = ReplyCode::NotAtRest;
       } else {
         if (safety::has_torque(mode_)) raise(Trigger::TorqueOffAsked);
+        held_ = false;
         forget_session();
         code = ReplyCode::Done;
       }
@@ -287,8 +289,9 @@ ReplyCode Controller::reset_fault() noexcept {
   if (mode_ != Mode::Fault) return ReplyCode::WrongMode;
   // A drive keeps its fault until it is reset from here; everything else has to be gone already.
   if (link_.state != hal::LinkState::Operational || !link_.complete) return ReplyCode::StillFaulty;
-  if (fault_ == Fault::EncoderJump || fault_ == Fault::Inconsistent || fault_ == Fault::FeedbackLost || fault_ == Fault::HeartbeatLost)
-    homed_ = false;  // the counts may no longer mean what they meant
+  if (counts_doubtful_) homed_ = false;
+  counts_doubtful_ = false;
+  held_ = false;
   announce(EventKind::FaultCleared, mode_, Mode::Off);
   fault_ = Fault::None;
   stopping_ = false;
@@ -303,8 +306,7 @@ void Controller::follow_up() noexcept {
   if (tare_ticks_ != 0) {
     tare_sum_ += sensor_wrench_;
     if (missed_sensor_ > rig_.timing.missed_sensor_ticks || motion_.moving()) {
-      tare_ticks_ = 0;
-      reply(tare_command_.session, tare_command_.id, CommandKind::Tare, ReplyCode::Stopped);
+      abandon_tare();
     } else if (--tare_ticks_ == 0) {
       tare_ = tare_sum_ / static_cast<double>(tare_ticks);
       tared_ = true;
@@ -322,6 +324,7 @@ void Controller::follow_up() noexcept {
   }
   if (stopping_ && !motion_.moving()) {
     stopping_ = false;
+    held_ = false;
     if (fault_ == Fault::None) {
       raise(Trigger::TorqueOffAsked);
       forget_session();
@@ -330,7 +333,13 @@ void Controller::follow_up() noexcept {
 }
 
 void Controller::check(bool violated, Fault fault, double value, double limit) noexcept {
-  if (violated && fault_ == Fault::None) latch(fault, value, limit);
+  if (!violated) return;
+  if (fault == Fault::EncoderJump || fault == Fault::Inconsistent || fault == Fault::FeedbackLost || fault == Fault::HeartbeatLost)
+    counts_doubtful_ = true;
+  if (fault_ == Fault::None)
+    latch(fault, value, limit);
+  else if (mode_ == Mode::Fault && held_ && fault != fault_)
+    escalate(fault, value, limit);
 }
 
 void Controller::supervise(const TickInput& input) noexcept {
@@ -357,7 +366,12 @@ void Controller::supervise(const TickInput& input) noexcept {
     }
     return;
   }
-  if (!safety::has_torque(mode_)) return;
+  if (mode_ == Mode::Fault) {
+    // The drives may have lost their counts with their power.
+    if (!operational || missed_feedback_ > rig_.timing.missed_feedback_ticks) counts_doubtful_ = true;
+    if (session_ != 0 && host_.expired(now_ns_)) forget_session();  // anyone may reset what its commander left
+  }
+  if (!safety::has_torque(mode_) && !position_controlled()) return;
 
   const auto& l = rig_.limits;
   check(missed_feedback_ > rig_.timing.missed_feedback_ticks, Fault::FeedbackLost, missed_feedback_, rig_.timing.missed_feedback_ticks);
@@ -402,8 +416,7 @@ void Controller::supervise(const TickInput& input) noexcept {
 
 bool Controller::position_controlled() const noexcept {
   if (mode_ == Mode::Position || mode_ == Mode::Hold) return true;
-  return mode_ == Mode::Fault && (safety::row(fault_).reaction == safety::Reaction::Hold ||
-                                  (safety::row(fault_).reaction == safety::Reaction::QuickStop && stopping_));
+  return mode_ == Mode::Fault && held_;
 }
 
 void Controller::control() noexcept {
@@ -505,8 +518,8 @@ void Controller::latch(Fault fault, double value, double limit) noexcept {
   const bool controlled = position_controlled();
   raise(Trigger::FaultRaised);
   announce(EventKind::FaultLatched, from, mode_, value, limit);
-  arm_command_ = {};
-  tare_ticks_ = 0;
+  abandon_arm();
+  abandon_tare();
   const auto reaction = safety::row(fault).reaction;
   motion_end_ = ReplyCode::Stopped;
   if (reaction == safety::Reaction::TorqueOff) {
@@ -517,7 +530,34 @@ void Controller::latch(Fault fault, double value, double limit) noexcept {
     motion_.rest(state_.x);
     pid_ = {};
   }
-  stopping_ = reaction == safety::Reaction::QuickStop;
+  held_ = reaction != safety::Reaction::TorqueOff;
+  stopping_ = held_ && (stopping_ || reaction == safety::Reaction::QuickStop);  // a stop that was asked for stays asked for
+}
+
+// A second fault while the first one's reaction keeps the torque on: the first cause stays, the severer reaction runs.
+void Controller::escalate(Fault fault, double value, double limit) noexcept {
+  const auto reaction = safety::row(fault).reaction;
+  if (reaction == safety::Reaction::Hold || (reaction == safety::Reaction::QuickStop && stopping_)) return;
+  mail_.events.push({tick_, now_ns_, EventKind::FaultLatched, mode_, mode_, fault, value, limit});
+  if (reaction == safety::Reaction::TorqueOff) {
+    motion_.rest(state_.x);
+    held_ = false;
+    stopping_ = false;
+  } else {
+    motion_.brake(rig_.limits);
+    stopping_ = true;
+  }
+}
+
+// Every command that was accepted is answered a second time, also when something else ends it.
+void Controller::abandon_arm() noexcept {
+  if (arm_command_.session != 0) reply(arm_command_.session, arm_command_.id, CommandKind::Arm, ReplyCode::Stopped);
+  arm_command_ = {};
+}
+
+void Controller::abandon_tare() noexcept {
+  if (tare_ticks_ != 0) reply(tare_command_.session, tare_command_.id, CommandKind::Tare, ReplyCode::Stopped);
+  tare_ticks_ = 0;
 }
 
 void Controller::hold_here() noexcept {
@@ -533,7 +573,7 @@ void Controller::hold_here() noexcept {
 void Controller::forget_session() noexcept {
   if (session_ != 0) announce(EventKind::SessionReleased, mode_, mode_);
   session_ = 0;
-  arm_command_ = {};
+  abandon_arm();
 }
 
 void Controller::end_motion(ReplyCode code) noexcept {

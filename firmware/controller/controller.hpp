@@ -79,6 +79,9 @@ class Controller {
 
   void raise(safety::Trigger trigger) noexcept;
   void latch(Fault fault, double value, double limit) noexcept;
+  void escalate(Fault fault, double value, double limit) noexcept;
+  void abandon_arm() noexcept;
+  void abandon_tare() noexcept;
   void hold_here() noexcept;
   void forget_session() noexcept;
   void end_motion(ReplyCode code) noexcept;
@@ -133,6 +136,8 @@ class Controller {
   Command arm_command_{};      // Arm that waits for the drives
   ReplyCode motion_end_{ReplyCode::Done};
   bool stopping_{};            // braking, torque off at rest
+  bool held_{};                // in Fault: the reaction keeps the handle under position control
+  bool counts_doubtful_{};     // since a fault the counts may no longer mean what they meant: home again
   std::uint32_t last_move_id_{};
   control::Motion motion_{};
   std::array<control::PidState, 3> pid_{};

@@ -249,6 +249,47 @@ TEST(ControllerFaults, ResetIsRefusedWhileTheLinkIsDown) {
   EXPECT_EQ(f.send(CommandKind::ResetFault), ReplyCode::StillFaulty);
   f.feedback.state = hal::LinkState::Operational;
   EXPECT_EQ(f.send(CommandKind::ResetFault), ReplyCode::Done);
+  EXPECT_FALSE(f.controller->status().homed);
+}
+
+TEST(ControllerFaults, DrivesThatLostTheirPowerInAFaultAreHomedAgain) {
+  FakeRig f;
+  f.positioned();
+  f.late_ns = 3 * FakeRig::ms;
+  f.tick();
+  f.late_ns = 0;
+  expect_fault(f, Fault::LateTick);
+  f.feedback.state = hal::LinkState::BringUp;
+  f.drives_answer = false;
+  f.tick(100);
+  f.feedback.state = hal::LinkState::Operational;
+  f.drives_answer = true;
+  f.tick(10);
+  EXPECT_EQ(f.send(CommandKind::ResetFault), ReplyCode::Done);
+  EXPECT_FALSE(f.controller->status().homed);
+}
+
+TEST(ControllerFaults, StopStaysAskedForWhenAFaultComesWhileItBrakes) {
+  FakeRig f;
+  f.moving();
+  ASSERT_EQ(f.send(CommandKind::Stop), ReplyCode::Done);
+  ASSERT_EQ(f.sample().moving, 1);
+  f.feedback.sensor.saturated = true;
+  f.tick();
+  expect_fault(f, Fault::SensorSaturated);
+  f.tick(500);
+  EXPECT_TRUE(f.torque_free());
+}
+
+TEST(ControllerFaults, DisarmTakesTheTorqueWhileHeldInAFault) {
+  FakeRig f;
+  f.positioned();
+  f.feedback.sensor.saturated = true;
+  f.tick(2);
+  expect_fault(f, Fault::SensorSaturated);
+  ASSERT_FALSE(f.torque_free());
+  EXPECT_EQ(f.send(CommandKind::Disarm), ReplyCode::Done);
+  EXPECT_TRUE(f.torque_free());
 }
 
 TEST(ControllerFaults, RigWorksAgainAfterANaNOfTheSensor) {
