@@ -76,6 +76,18 @@ TEST(Demo, EndsCleanlyOnCtrlC) {
   EXPECT_FALSE(std::filesystem::exists(scratch / "run/.run.toml.part"));
 }
 
+TEST(Demo, ReportsARunThatWasStoppedBeforeHoming) {
+  const Scratch scratch;
+  Program program(scratch, "trocar", demo(scratch));
+  ASSERT_TRUE(program.wait_for("waiting for the drives", demo_s)) << program.errors();
+  program.signal(SIGINT);
+  EXPECT_EQ(program.wait(end_s), 1) << program.errors();
+  EXPECT_NE(program.errors().find("stopped by the user"), std::string::npos) << program.errors();
+  EXPECT_EQ(program.errors().find("gnuplot"), std::string::npos) << program.errors();
+  EXPECT_TRUE(std::filesystem::exists(scratch / "run/report.html"));
+  EXPECT_TRUE(nothing_runs(scratch));
+}
+
 TEST(Demo, LeavesNoProcessWhenItIsKilled) {
   const Scratch scratch;
   Program program(scratch, "trocar", demo(scratch));
