@@ -45,10 +45,19 @@ std::size_t figures(const std::filesystem::path& folder) {
   return count;
 }
 
+// For the message of a test that failed.
+std::string recorded_faults(const std::filesystem::path& run) {
+  std::string text;
+  if (std::filesystem::exists(run / "capture.mcap"))
+    for (const auto& e : capture::read_capture(run / "capture.mcap").events)
+      if (e.event.kind == EventKind::FaultLatched) text += std::string(to_string(e.event.fault)) + ": " + e.text + "\n";
+  return text;
+}
+
 TEST(Demo, LeavesAReportAndNoProcess) {
   const Scratch scratch;
   Program program(scratch, "trocar", demo(scratch));
-  ASSERT_EQ(program.wait(demo_s), 0) << program.errors();
+  ASSERT_EQ(program.wait(demo_s), 0) << program.errors() << recorded_faults(scratch / "run");
   EXPECT_TRUE(processes_mentioning(scratch.folder().string()).empty());
   const auto run = scratch / "run";
   const std::string report = read_text(run / "report.html");
