@@ -180,6 +180,8 @@ std::string tracking_script(const RunInfo& run, std::span<const Sample> samples)
 }
 
 std::string overview_script(const RunInfo& run, std::span<const Sample> samples) {
+  // A run that ended before homing has no poses, and gnuplot refuses a curve without a point.
+  if (std::ranges::none_of(samples, [&](const Sample& s) { return std::isfinite(tip_depth_m(run, s)); })) return {};
   TimeSlices depth(samples), force(samples);
   for (const Sample& s : samples) {
     depth.add(s, 1e3 * tip_depth_m(run, s));

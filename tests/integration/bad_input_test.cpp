@@ -44,9 +44,10 @@ std::string line_of(const std::filesystem::path& file, const std::string& text) 
 
 struct Mistake {
   const char* name;
-  const char* right;  // what ubc_twin.toml has
-  const char* wrong;  // what stands there instead
-  Words words;        // what the message has to hold besides file and line
+  const char* right;         // what ubc_twin.toml has
+  const char* wrong;         // what stands there instead
+  Words words;               // what the message has to hold besides file and line
+  const char* at = nullptr;  // whose line is named, if not that of `wrong`
 };
 void PrintTo(const Mistake& m, std::ostream* out) { *out << m.name; }
 
@@ -59,7 +60,7 @@ TEST_P(RigFile, IsRefusedByEveryProgramThatReadsIt) {
   const auto experiment = scratch.make_experiment().string();
   const auto out = scratch / "out";
   Words words = m.words;
-  words.push_back(line_of(rig, m.wrong));
+  words.push_back(line_of(rig, m.at != nullptr ? m.at : m.wrong));
   expect_refusal(scratch, "trocar-rig", {"--rig", rig.string(), "--domain", domain(), "--best-effort"}, words);
   expect_refusal(scratch, "trocar-plant", {"--rig", rig.string()}, words);
   expect_refusal(scratch, "trocar-bench", {"--experiment", experiment, "--out", out.string()}, words);
@@ -73,8 +74,12 @@ INSTANTIATE_TEST_SUITE_P(
     Mistakes, RigFile,
     ::testing::Values(Mistake{"Malformed", "base_m = 0.08", "base_m = = 0.08", {}},
                       Mistake{
-                          "UnknownKey", "end_point_mass_kg = 0.02", "end_point_mass_kg = 0.02\nend_point_colour = 3", {"end_point_colour"}},
-                      Mistake{"MisspeltKey", "gear_efficiency = 0.85", "gear_eficiency = 0.85", {"gear_eficiency", "gear_efficiency"}},
+                          "UnknownKey", "end_point_mass_kg = 0.02", "end_point_colour = 3\nend_point_mass_kg = 0.02", {"end_point_colour"}},
+                      Mistake{"MisspeltKey",
+                              "gear_efficiency = 0.85",
+                              "gear_eficiency = 0.85",
+                              {"gear_eficiency: was gear_efficiency meant?"},
+                              "[actuation]"},
                       Mistake{"WrongType", "base_m = 0.08", "base_m = \"wide\"", {"base_m", "number", "wide"}},
                       Mistake{"NegativeLength", "length_m = [0.105, 0.105]", "length_m = [-0.105, 0.105]", {"length_m", "-0.105"}},
                       Mistake{"NotANumber", "base_m = 0.08", "base_m = nan", {"base_m"}},
@@ -121,15 +126,12 @@ TEST(BadInput, SingleLinkageCannotCarryTheHandle) {
   const Words twin_needed{"five_bar.toml:", "kind", "needs a twin", "take ubc_twin"};
   (void)scratch.make_rig();
   const auto out = scratch / "out";
-  expect_refusal(scratch, "trocar-rig", {"--rig", "five_bar", "--domain", domain(), "--best-effort"},
-                 twin_needed);
+  expect_refusal(scratch, "trocar-rig", {"--rig", "five_bar", "--domain", domain(), "--best-effort"}, twin_needed);
   expect_refusal(scratch, "trocar-plant", {"--rig", "five_bar"}, twin_needed);
   const auto experiment = scratch / "single.toml";
   write_text(experiment, shared_file("experiments/insertion.toml", {{"rig = \"ubc_twin\"", "rig = \"five_bar\""}}));
-  expect_refusal(scratch, "trocar", {"demo", "--experiment", experiment.string(), "--out", out.string()},
-                 twin_needed);
-  expect_refusal(scratch, "trocar-bench", {"--experiment", experiment.string(), "--out", out.string()},
-                 twin_needed);
+  expect_refusal(scratch, "trocar", {"demo", "--experiment", experiment.string(), "--out", out.string()}, twin_needed);
+  expect_refusal(scratch, "trocar-bench", {"--experiment", experiment.string(), "--out", out.string()}, twin_needed);
   EXPECT_TRUE(untouched(out));
 }
 

@@ -45,10 +45,19 @@ std::size_t figures(const std::filesystem::path& folder) {
   return count;
 }
 
+// For the message of a test that failed.
+std::string recorded_faults(const std::filesystem::path& run) {
+  std::string text;
+  if (std::filesystem::exists(run / "capture.mcap"))
+    for (const auto& e : capture::read_capture(run / "capture.mcap").events)
+      if (e.event.kind == EventKind::FaultLatched) text += std::string(to_string(e.event.fault)) + ": " + e.text + "\n";
+  return text;
+}
+
 TEST(Demo, LeavesAReportAndNoProcess) {
   const Scratch scratch;
   Program program(scratch, "trocar", demo(scratch));
-  ASSERT_EQ(program.wait(demo_s), 0) << program.errors();
+  ASSERT_EQ(program.wait(demo_s), 0) << program.errors() << recorded_faults(scratch / "run");
   EXPECT_TRUE(processes_mentioning(scratch.folder().string()).empty());
   const auto run = scratch / "run";
   const std::string report = read_text(run / "report.html");
@@ -74,6 +83,18 @@ TEST(Demo, EndsCleanlyOnCtrlC) {
   EXPECT_TRUE(log.report.finished);
   EXPECT_GT(log.samples.size(), 1000U);
   EXPECT_FALSE(std::filesystem::exists(scratch / "run/.run.toml.part"));
+}
+
+TEST(Demo, ReportsARunThatWasStoppedBeforeHoming) {
+  const Scratch scratch;
+  Program program(scratch, "trocar", demo(scratch));
+  ASSERT_TRUE(program.wait_for("waiting for the drives", demo_s)) << program.errors();
+  program.signal(SIGINT);
+  EXPECT_EQ(program.wait(end_s), 1) << program.errors();
+  EXPECT_NE(program.errors().find("stopped by the user"), std::string::npos) << program.errors();
+  EXPECT_EQ(program.errors().find("gnuplot"), std::string::npos) << program.errors();
+  EXPECT_TRUE(std::filesystem::exists(scratch / "run/report.html"));
+  EXPECT_TRUE(nothing_runs(scratch));
 }
 
 TEST(Demo, LeavesNoProcessWhenItIsKilled) {

@@ -170,8 +170,7 @@ TEST_F(Kill, RigLatchesFeedbackLostWhenThePlantIsGone) {
 }
 
 TEST_F(Kill, RigHoldsUnderTorqueWhenTheHostIsGone) {
-  const auto experiment =
-      scratch.make_experiment({{"approach_speed_m_s = 0.030", "approach_speed_m_s = 0.005"}});
+  const auto experiment = scratch.make_experiment({{"approach_speed_m_s = 0.030", "approach_speed_m_s = 0.005"}});
   std::optional<Program> host;
   host.emplace(scratch, "trocar",
                std::vector<std::string>{"experiment", "run", experiment.string(), "--domain", domain, "--out", (scratch / "run").string()});
