@@ -1,6 +1,7 @@
 #include "common/config/share.hpp"
 
 #include <fmt/format.h>
+#include <sys/auxv.h>
 
 #include <algorithm>
 #include <string>
@@ -27,8 +28,12 @@ std::vector<std::string> names_in(const std::filesystem::path& folder) {
 
 std::filesystem::path share_folder() {
   std::error_code error;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error) throw UserError("cannot find the folder of the running program (/proc is not mounted?); give paths instead of names");
+  std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) {  // a bare root without /proc: the path that started this program, which the kernel leaves in its memory
+    const auto* started_as = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
+    if (started_as != nullptr) program = std::filesystem::canonical(started_as, error);
+  }
+  if (program.empty()) throw UserError("cannot find the folder of the running program; give paths instead of names");
   return program.parent_path().parent_path() / "share" / "trocar";
 }
 

@@ -9,7 +9,7 @@
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
 #include "common/mechanism/capability.hpp"
-#include "hal/can/budget.hpp"
+#include "common/rig/bus_budget.hpp"
 #include "host/rig/client.hpp"
 
 namespace trocar::cli {
@@ -57,7 +57,7 @@ int rig_info(const std::string& name, bool json) {
     throw config::UserError(fmt::format("{}: [limits] workspace_x_m, workspace_y_m: part of this box is out of reach; make it smaller (the largest square is "
                                         "{:.0f} mm around ({:.0f}, {:.0f}) mm)",
                                         file.string(), 1e3 * square.side_m, 1e3 * square.centre_m[0], 1e3 * square.centre_m[1]));
-  const hal::BusBudget budget = hal::bus_budget(r);
+  const rig::BusBudget budget = rig::bus_budget(r);
   if (json) {
     fmt::print("{{\"name\": \"{}\", \"kind\": \"{}\", \"largest_square_m\": {}, \"largest_square_centre_m\": [{}, {}], \"workspace_x_m\": [{}, {}], "
                "\"workspace_y_m\": [{}, {}], \"position_step_m\": {}, \"position_rms_m\": {}, \"angle_step_rad\": {}, \"peak_force_n\": {}, "

@@ -7,7 +7,6 @@
 namespace trocar::sim_plant {
 
 using hal::CanFrame;
-using hal::load;
 using hal::canopen::DriveState;
 using hal::canopen::NmtCommand;
 using hal::canopen::NmtState;

@@ -110,7 +110,7 @@ std::optional<SdoAbort> ObjectDictionary::check(const Entry& entry, std::uint32_
     if (subindex == 0) {
       if (value > 4) return SdoAbort::OutOfRange;
       std::uint32_t bytes = 0;
-      for (std::uint8_t place = 1; place <= value; ++place) {
+      for (std::uint8_t place = 1; place <= static_cast<std::uint8_t>(value); ++place) {
         const Object mapped = from_mapping(get(object::map_entry(index, place)));
         if (mapped.bytes == 0) return SdoAbort::NotMappable;
         bytes += mapped.bytes;

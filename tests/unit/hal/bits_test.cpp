@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "hal/can/budget.hpp"
+#include "common/rig/bus_budget.hpp"
 #include "rig_fixture.hpp"
 
 namespace trocar::hal {
@@ -67,17 +67,17 @@ TEST(CanBits, AgreeWithLongDivisionAndStayBelowWorstCase) {
       byte = std::array<std::uint8_t, 4>{0x00, 0xFF, 0xF0, static_cast<std::uint8_t>(random())}[random() % 4];
     const std::uint32_t bits = can_bits(frame);
     ASSERT_EQ(bits, reference_bits(frame));
-    ASSERT_LE(bits, worst_case_can_bits(frame.remote ? 0 : frame.length, frame.extended));
+    ASSERT_LE(bits, rig::worst_case_can_bits(frame.remote ? 0 : frame.length, frame.extended));
     if (!frame.extended && frame.length == 8 && !frame.remote) most = std::max(most, bits);
   }
   EXPECT_GT(most, 111u + 13u);  // the worst case is not merely a bound: runs come close to it
 }
 
 TEST(BusBudget, IsThatOfTheDesign) {
-  const BusBudget twin = bus_budget(make_test_rig());
-  EXPECT_EQ(worst_case_can_bits(0), 55u);
-  EXPECT_EQ(worst_case_can_bits(1), 65u);
-  EXPECT_EQ(worst_case_can_bits(8), 135u);
+  const rig::BusBudget twin = rig::bus_budget(make_test_rig());
+  EXPECT_EQ(rig::worst_case_can_bits(0), 55u);
+  EXPECT_EQ(rig::worst_case_can_bits(1), 65u);
+  EXPECT_EQ(rig::worst_case_can_bits(8), 135u);
   EXPECT_NEAR(twin.drives_cyclic_percent, 73.0, 1e-9);
   EXPECT_NEAR(twin.drives_peak_percent, 86.5, 1e-9);
   EXPECT_NEAR(twin.sensor_percent, 33.5, 1e-9);
@@ -85,8 +85,8 @@ TEST(BusBudget, IsThatOfTheDesign) {
 
   rig::Rig fast = make_test_rig();
   fast.timing.tick_hz = 1300;
-  EXPECT_FALSE(bus_budget(fast).fits());
-  EXPECT_NEAR(bus_budget(make_test_rig(rig::Kind::Single)).drives_cyclic_percent, 46.0, 1e-9);
+  EXPECT_FALSE(rig::bus_budget(fast).fits());
+  EXPECT_NEAR(rig::bus_budget(make_test_rig(rig::Kind::Single)).drives_cyclic_percent, 46.0, 1e-9);
 }
 
 }  // namespace

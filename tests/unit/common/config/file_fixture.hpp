@@ -24,7 +24,7 @@ class FileFixture : public ::testing::Test {
   ~FileFixture() override { std::filesystem::remove_all(folder_); }
 
   std::filesystem::path write(std::string_view text) const {
-    const auto file = folder_ / "file.toml";
+    auto file = folder_ / "file.toml";
     std::ofstream(file, std::ios::binary) << text;
     return file;
   }

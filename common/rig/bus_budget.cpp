@@ -1,10 +1,8 @@
-#include "hal/can/budget.hpp"
+#include "common/rig/bus_budget.hpp"
 
-#include "hal/can/bits.hpp"
+namespace trocar::rig {
 
-namespace trocar::hal {
-
-BusBudget bus_budget(const rig::Rig& rig) noexcept {
+BusBudget bus_budget(const Rig& rig) noexcept {
   const auto drives = static_cast<std::uint32_t>(rig.drives());
   constexpr std::uint32_t full = worst_case_can_bits(8);
   BusBudget budget;
@@ -21,4 +19,4 @@ BusBudget bus_budget(const rig::Rig& rig) noexcept {
   return budget;
 }
 
-}  // namespace trocar::hal
+}  // namespace trocar::rig

@@ -8,7 +8,15 @@
 
 #include "common/rig/rig.hpp"
 
-namespace trocar::hal {
+namespace trocar::rig {
+
+// Bit times that any classic CAN frame of that many data bytes takes at most, intermission (3 bits) included: its stuffed part
+// S = 34 + 8 n (11-bit identifier) or 54 + 8 n (29-bit), one stuff bit every four after the first five equal bits, and a fixed part.
+//   S + floor((S - 1) / 4) + 13                 ISO 11898-1
+[[nodiscard]] constexpr std::uint32_t worst_case_can_bits(std::uint32_t data_bytes, bool extended = false) noexcept {
+  const std::uint32_t stuffed = (extended ? 54u : 34u) + 8u * data_bytes;
+  return stuffed + (stuffed - 1) / 4 + 13;
+}
 
 struct BusBudget {
   double bits_per_tick{};  // what the bit rate offers
@@ -22,6 +30,6 @@ struct BusBudget {
   [[nodiscard]] bool fits() const noexcept { return drives_peak_percent + heartbeat_percent <= 100.0 && sensor_percent <= 100.0; }
 };
 
-[[nodiscard]] BusBudget bus_budget(const rig::Rig& rig) noexcept;
+[[nodiscard]] BusBudget bus_budget(const Rig& rig) noexcept;
 
-}  // namespace trocar::hal
+}  // namespace trocar::rig
