@@ -27,7 +27,7 @@ class RecordBuilder {
   template <class U>
   RecordBuilder& number(U value) {
     static_assert(std::is_unsigned_v<U>);
-    for (std::size_t i = 0; i < sizeof(U); ++i) out_.push_back(static_cast<std::byte>((value >> (8 * i)) & 0xFFu));
+    for (std::size_t i = 0; i < sizeof(U); ++i) out_.push_back(static_cast<std::byte>((std::uint64_t{value} >> (8 * i)) & 0xFFu));
     return *this;
   }
   RecordBuilder& text(std::string_view value) {
@@ -40,7 +40,7 @@ class RecordBuilder {
   }
   template <class U>
   void patch(std::size_t at, U value) {
-    for (std::size_t i = 0; i < sizeof(U); ++i) out_[at + i] = static_cast<std::byte>((value >> (8 * i)) & 0xFFu);
+    for (std::size_t i = 0; i < sizeof(U); ++i) out_[at + i] = static_cast<std::byte>((std::uint64_t{value} >> (8 * i)) & 0xFFu);
   }
 
  private:

@@ -55,11 +55,11 @@ void deserialise(std::span<const std::byte> cdr, void* value, const dds_topic_de
            " where 9 (delimited XCDR2, little endian) is expected");
   }
   const std::size_t padding = std::to_integer<std::size_t>(cdr[3]) & 3u;
-  if (cdr.size() < header_size + padding) refuse("padding exceeds the message");
+  if (cdr.size() <= header_size + padding) refuse("there is nothing but a header");
 
   // Checking swaps bytes in place where needed, and makes the reading below safe against hostile lengths.
   std::vector<char> body(cdr.size() - header_size - padding);
-  std::memcpy(body.data(), cdr.data() + header_size, body.size());
+  std::ranges::copy(cdr.subspan(header_size, body.size()), reinterpret_cast<std::byte*>(body.data()));
   const auto size = static_cast<std::uint32_t>(body.size());
   std::uint32_t offset = 0;
   if (dds_stream_normalize_data(body.data(), &offset, size, cdr[1] == d_cdr2_be, xcdr2, type.m_ops) == nullptr) {

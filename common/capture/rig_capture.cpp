@@ -11,15 +11,14 @@ namespace trocar::capture {
 RigCaptureWriter::RigCaptureWriter(const std::filesystem::path& path) : file_(path, {.profile = "", .library = "trocar"}) {
   for (std::size_t i = 0; i < wire::topics.size(); ++i) {
     const wire::Topic& topic = wire::topics[i];
-    const char* type = topic.name == wire::samples_topic.name ? wire::descriptor<wire::Sample>().m_typename : topic.type;
+    const char* type = topic == wire::samples_topic ? wire::descriptor<wire::Sample>().m_typename : topic.type;
     channels_[i] = file_.add_channel(file_.add_schema(type, "omgidl", wire::idl_text()), topic.name, "cdr",
                                      {{"protocol", std::to_string(protocol_version)}});
   }
 }
 
 std::uint16_t RigCaptureWriter::channel_of(const wire::Topic& topic) const {
-  const auto found =
-      std::ranges::find(wire::topics, std::string_view(topic.name), [](const wire::Topic& t) { return std::string_view(t.name); });
+  const auto found = std::ranges::find(wire::topics, topic);
   if (found == wire::topics.end()) throw CaptureError(std::string("captures have no topic ") + topic.name);
   return channels_[static_cast<std::size_t>(found - wire::topics.begin())];
 }

@@ -13,6 +13,9 @@ struct Topic {
   bool reliable{};
   bool transient_local{};  // a late reader still gets the last `depth` values
   std::uint32_t depth{};   // samples kept per writer and reader; 0 keeps all
+
+  // By name: literals of one text may have several addresses in a program.
+  friend constexpr bool operator==(const Topic& a, const Topic& b) noexcept { return std::string_view(a.name) == b.name; }
 };
 
 // Samples: a lost batch is history, resending would only delay the next; deep, so that a reader may sleep for seconds.

@@ -76,7 +76,7 @@ void Recorder::take() {
     const wire::Topic& topic = reader.topic();
     reader.take([&](std::span<const std::byte> cdr, std::int64_t written_ns) {
       const auto publish_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, written_ns));
-      if (topic.name != wire::samples_topic.name) {
+      if (topic != wire::samples_topic) {
         ++recording_.messages[topic.name];
         file_.write_cdr(topic, wall_clock_ns(), publish_ns, cdr);
         return;

@@ -62,7 +62,7 @@ std::string table(std::initializer_list<const char*> heads, const std::string& r
   return out + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
 }
 
-std::string speed(double m_s) { return fmt::format("{:.3g}&nbsp;mm/s", 1e3 * m_s); }
+std::string speed(double m_s) { return fmt::format("<span class=\"n\">{:.3g}&nbsp;mm/s</span>", 1e3 * m_s); }
 
 const Insertion* insertion_at(const Summary& summary, double speed_m_s, const std::string& gains) {
   const Insertion* found = nullptr;
@@ -95,12 +95,11 @@ std::string beside_thesis(const RunInfo& run, const Summary& summary) {
     rows += row({"Sag with the thesis's gains", "F/K<sub>p</sub>: 3&nbsp;mm at 2.5&nbsp;N", none, ""});
   }
   for (const Sag& sag : summary.sags) {
-    rows +=
-        row({"Sag with the thesis's gains, " + escaped(sag.phase),
-             fmt::format("F/K<sub>p</sub> = {} at {}", millimetres(sag.expected_m), newtons(sag.force_n)), millimetres(sag.error_m),
-             fmt::format("K<sub>p</sub> = {:g}&nbsp;N/m; asked of the mechanism: {}, and {}/K<sub>p</sub> = {} (the difference to the base "
-                         "force is friction)",
-                         run.kp_n_per_m, newtons(sag.command_n), "that", millimetres(sag.expected_command_m))});
+    rows += row(
+        {"Sag with the thesis's gains, " + escaped(sag.phase),
+         fmt::format("F/K<sub>p</sub> = {} at {}", millimetres(sag.expected_m), newtons(sag.force_n)), millimetres(sag.error_m),
+         fmt::format("K<sub>p</sub> = {:g}&nbsp;N/m; the mechanism was asked for {}, which sags by {}: friction in it makes the difference",
+                     run.kp_n_per_m, newtons(sag.command_n), millimetres(sag.expected_command_m))});
   }
   rows += row({"Resolution", "40&nbsp;µm", micrometres(summary.step_m), "median motion of the base for one count of one encoder"});
   return table({"Quantity", "Thesis", "This run", "How it was measured"}, rows);
@@ -110,7 +109,7 @@ std::string insertions_table(const RunInfo& run, const Summary& summary) {
   std::string rows;
   for (const Insertion& i : summary.insertions) {
     rows += row({speed(i.speed_m_s), escaped(i.gain_set.empty() ? run.gains : i.gain_set), millimetres(i.depth_m, 1),
-                 i.fit ? fmt::format("{:.2f}&nbsp;N/m", i.fit->slope_n_per_m) : none,
+                 i.fit ? fmt::format("<span class=\"n\">{:.2f}&nbsp;N/m</span>", i.fit->slope_n_per_m) : none,
                  i.fit ? fmt::format("{:.3f}&nbsp;N", i.fit->intercept_n) : none, newtons(i.full_depth_force_n),
                  newtons(i.withdrawal_force_n), millimetres(i.insert.rms_m), millimetres(i.withdraw.rms_m)});
   }
@@ -188,6 +187,7 @@ h1 { font-size: 1.6rem; margin-bottom: 0.2rem; } h2 { font-size: 1.15rem; margin
 .wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: 0.92rem; }
 th { text-align: left; font-weight: 600; border-bottom: 2px solid #555; } td, th { padding: 0.3rem 0.8rem 0.3rem 0; vertical-align: top; }
 td { border-bottom: 1px solid #ddd; } small, .none, figcaption, .sub { color: #666; }
+.n { white-space: nowrap; }
 figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: 0.9rem; }
 )";
 
