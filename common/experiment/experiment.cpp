@@ -14,6 +14,7 @@ namespace {
 constexpr std::array<const char*, 6> phase_names{"prepare", "air", "touch", "insert", "dwell", "withdraw"};
 constexpr double turn_speed_rad_s = 0.5;
 constexpr double reply_timeout_s = 3.0;  // beyond what the step itself should take, twice over
+constexpr std::int64_t ask_again_after_ns = 200'000'000;
 constexpr double lead_s = 0.6;           // start and end of a jerk-limited move, with round trip
 
 }  // namespace
@@ -150,6 +151,12 @@ void Sequencer::on_reply(const Reply& reply) {
       fail(fmt::format("{}: the rig stopped the motion (mode {}, fault {})", s.phase.name, trocar::to_string(reply.mode),
                        trocar::to_string(last_.fault)));
       return;
+    case ReplyCode::NotAtRest:  // drives that were just enabled, or a handle that somebody touched, settle by themselves
+      if (now_ns_ - step_start_ns_ < static_cast<std::int64_t>(1e9 * reply_timeout_s)) {
+        ask_again_ns_ = now_ns_ + ask_again_after_ns;
+        return;
+      }
+      [[fallthrough]];
     default:
       fail(fmt::format("{}: the rig refused {}: {} (mode {})", s.phase.name, trocar::to_string(reply.kind), trocar::to_string(reply.code),
                        trocar::to_string(reply.mode)));
@@ -177,6 +184,10 @@ void Sequencer::on_sample(const Sample& sample) {
 }
 
 std::optional<Command> Sequencer::next() {
+  if (!finished() && ask_again_ns_ != 0 && now_ns_ >= ask_again_ns_) {
+    ask_again_ns_ = 0;
+    return steps_[step_].command;
+  }
   if (finished() || sent_ || !seen_ || mode_ == Mode::Off) return std::nullopt;
   sent_ = true;
   step_start_ns_ = now_ns_;

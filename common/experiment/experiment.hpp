@@ -95,6 +95,7 @@ class Sequencer {
   std::uint64_t now_tick_{};
   std::int64_t now_ns_{};
   std::int64_t step_start_ns_{};
+  std::int64_t ask_again_ns_{};  // 0: no refused command waits for another try
   double done_s_{};
   double expected_total_s_{};
   std::string planned_gains_;
