@@ -95,7 +95,8 @@ std::string force_depth_script(const RunInfo& run, std::span<const Sample> sampl
   return head("force_depth", 900, 520) + blocks +
          fmt::format(
              "set xlabel 'depth of the tip below the surface [mm]'\nset ylabel 'force at the base, along the needle [N]'\n"
-             "set xrange [-3:*]\nset samples 500\nset key top left Left reverse samplen 2\nset xzeroaxis lc rgb '{0}' lt 1 lw 1\n"
+             "set xrange [-3:*]\nset autoscale xfixmax\nset samples 500\nset key top left Left reverse samplen 2\nset xzeroaxis lc rgb "
+             "'{0}' lt 1 lw 1\n"
              "plot (x < 0 ? 1/0 : {1}*x/1000) with lines lw 1.5 dt (2,4) lc rgb '{0}' title 'thesis: {1} N/m at 1 mm/s'{2}\n",
              dark, thesis_shaft_n_per_m, plots);
 }
@@ -162,8 +163,8 @@ std::string tracking_script(const RunInfo& run, std::span<const Sample> samples)
     }
   }
   if (!any) return {};
-  // A logarithm has no place for an exact zero; a nanometre is below every digit of interest.
-  const auto millimetres = [](double metres) { return std::max(1e-6, 1e3 * metres); };
+  // A logarithm has no place for an exact zero; a tenth of a micrometre is far below an encoder's count.
+  const auto millimetres = [](double metres) { return std::max(1e-4, 1e3 * metres); };
   return head("tracking", 900, 420) + shading(run, samples) +
          error.block("error",
                      [&](const TimeSlices::Slice& s) {
@@ -251,7 +252,9 @@ std::vector<Figure> draw_figures(const RunInfo& run, const Summary& summary, std
        "Solid: insertion. Dashed: withdrawal. Each point is the mean of a 0.25 mm slice of depth. Dotted: the shaft force density that the "
        "thesis found at 1 mm/s, from zero at the surface."});
   add(tracking_script(run, samples),
-      {"tracking.svg", "Tracking error", "Distance between commanded and measured position of the needle's base, in slices of time."});
+      {"tracking.svg", "Tracking error",
+       "Distance between commanded and measured position of the needle's base, in slices of time; below 0.1 µm counts as 0.1 µm. The scale "
+       "is logarithmic."});
   add(overview_script(run, samples), {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
   add(histogram_script("tick_time", "execution time of the tick", samples, summary.tick_us,
                        [](const Sample& s) { return static_cast<double>(s.tick_us); }),

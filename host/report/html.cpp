@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -16,6 +17,8 @@ namespace trocar::report {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double thesis_speed_m_s = 0.001;
 
 std::string escaped(std::string_view text) {
   std::string out;
@@ -64,32 +67,31 @@ std::string table(std::initializer_list<const char*> heads, const std::string& r
 
 std::string speed(double m_s) { return fmt::format("<span class=\"n\">{:.3g}&nbsp;mm/s</span>", 1e3 * m_s); }
 
-const Insertion* insertion_at(const Summary& summary, double speed_m_s, const std::string& gains) {
-  const Insertion* found = nullptr;
-  for (const Insertion& i : summary.insertions) {
-    if (std::abs(i.speed_m_s - speed_m_s) > 1e-9) continue;
-    if (found == nullptr || (i.gain_set == gains && found->gain_set != gains)) found = &i;
-  }
-  return found;
+// The insertion whose speed is nearest to the thesis's 1 mm/s, rather with the run's own gains.
+const Insertion* nearest_to_thesis(const RunInfo& run, const Summary& summary) {
+  const auto distance = [&](const Insertion& i) {
+    return std::pair(i.gain_set == run.gains ? 0 : 1, std::abs(i.speed_m_s - thesis_speed_m_s));
+  };
+  const auto found = std::ranges::min_element(summary.insertions, {}, distance);
+  return found == summary.insertions.end() ? nullptr : &*found;
 }
 
 std::string beside_thesis(const RunInfo& run, const Summary& summary) {
   std::string rows;
-  const Insertion* slow = insertion_at(summary, 0.001, run.gains);
-  const auto slow_or = [&](auto&& value) {
-    return slow == nullptr ? std::string("<span class=\"none\">no insertion at 1&nbsp;mm/s</span>") : value(*slow);
+  const Insertion* near = nearest_to_thesis(run, summary);
+  const auto measured = [&](bool known, auto&& value) {
+    return known ? value() + "<br><small>at " + speed(near->speed_m_s) + "</small>" : std::string(none);
   };
-  rows += row({"Shaft force density at 1&nbsp;mm/s", "34&nbsp;N/m <small>(section 4.2, figure 4.9)</small>",
-               slow_or([](const Insertion& i) { return i.fit ? fmt::format("{:.2f}&nbsp;N/m", i.fit->slope_n_per_m) : std::string(none); }),
-               "slope of base force over depth, 20 to 65&nbsp;mm"});
-  rows += row({"Force peak at the tip, 1&nbsp;mm/s", "68&nbsp;N/m at the most distal node", slow_or([](const Insertion& i) {
-                 return i.fit ? fmt::format("{:.3f}&nbsp;N more than a uniform shaft", i.fit->intercept_n) : std::string(none);
-               }),
+  const bool fitted = near != nullptr && near->fit.has_value();
+  rows += row({"Shaft force density", "34&nbsp;N/m at 1&nbsp;mm/s <small>(section 4.2, figure 4.9)</small>",
+               measured(fitted, [&] { return fmt::format("{:.2f}&nbsp;N/m", near->fit->slope_n_per_m); }),
+               "slope of base force over depth, 20 to 65&nbsp;mm; it grows with speed (figure 4.19)"});
+  rows += row({"Force peak at the tip", "68&nbsp;N/m at the most distal node, at 1&nbsp;mm/s",
+               measured(fitted, [&] { return fmt::format("{:+.3f}&nbsp;N against a uniform shaft", near->fit->intercept_n); }),
                "the same line at depth 0; a base force shows the tip's total, not its density"});
-  rows += row({"Base force at full depth, 1&nbsp;mm/s", "2.3 to 2.4&nbsp;N at 70&nbsp;mm <small>(read from figure 4.10)</small>",
-               slow_or([](const Insertion& i) {
-                 return newtons(i.full_depth_force_n) + (std::isfinite(i.depth_m) ? " at " + millimetres(i.depth_m, 1) : "");
-               }),
+  rows += row({"Base force at full depth", "2.3 to 2.4&nbsp;N at 70&nbsp;mm, 1&nbsp;mm/s <small>(read from figure 4.10)</small>",
+               measured(near != nullptr && std::isfinite(near->full_depth_force_n),
+                        [&] { return newtons(near->full_depth_force_n) + " at " + millimetres(near->depth_m, 1); }),
                "mean over the deepest 0.5&nbsp;mm"});
   if (summary.sags.empty()) {
     rows += row({"Sag with the thesis's gains", "F/K<sub>p</sub>: 3&nbsp;mm at 2.5&nbsp;N", none, ""});

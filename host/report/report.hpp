@@ -90,8 +90,8 @@ struct Sag {  // mean over the second half of a Dwell phase, or over the deepest
 struct Summary {
   std::uint64_t samples{}, lost_ticks{}, gaps{}, restarts{};
   double duration_s{};
-  std::uint64_t ticks_without_feedback{}, longest_without_feedback{};
-  std::vector<std::string> faults;  // names, in the order of appearance
+  std::uint64_t ticks_without_feedback{}, longest_without_feedback{};  // while the drives were not Off
+  std::vector<std::string> faults;                                     // names, in the order of appearance
   std::vector<Insertion> insertions;
   std::vector<GainTracking> tracking;
   std::vector<Sag> sags;

@@ -261,9 +261,10 @@ Summary summarise(const RunInfo& run, std::span<const Sample> all) {
       ++summary.gaps;
       summary.lost_ticks += s.tick - samples[i - 1].tick - 1;
     }
-    missed_in_a_row = s.missed_feedback > 0 ? missed_in_a_row + 1 : 0;
-    summary.ticks_without_feedback += s.missed_feedback > 0 ? 1u : 0u;
-    summary.longest_without_feedback = std::max({summary.longest_without_feedback, missed_in_a_row, std::uint64_t{s.missed_feedback}});
+    const bool missed = s.missed_feedback > 0 && s.mode != Mode::Off;  // drives that are off owe none
+    missed_in_a_row = missed ? missed_in_a_row + 1 : 0;
+    summary.ticks_without_feedback += missed ? 1u : 0u;
+    summary.longest_without_feedback = std::max(summary.longest_without_feedback, missed_in_a_row);
     if (s.fault != Fault::None && std::ranges::find(summary.faults, to_string(s.fault)) == summary.faults.end()) {
       summary.faults.emplace_back(to_string(s.fault));
     }

@@ -65,7 +65,7 @@ int run(const Options& options) {
   std::int64_t next_keep_alive_ns = 0;
   std::uint64_t ticks = 0;
   const auto write_pending = [&] {
-    if (!pending.empty()) capture.write_samples(pending, static_cast<std::uint64_t>(bench.now_ns()));
+    if (!pending.empty()) capture.write_samples(pending);
     pending.clear();
   };
   while (!sequencer.finished() && !stop_asked.load()) {

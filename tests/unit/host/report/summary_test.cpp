@@ -110,6 +110,10 @@ TEST(Summary, CountsWhatIsMissing) {
   run.samples.erase(run.samples.begin() + 500, run.samples.begin() + 501);
   for (std::size_t i = 700; i < 703; ++i) run.samples[i].missed_feedback = static_cast<std::uint32_t>(i - 699);
   run.samples[900].missed_feedback = 1;
+  for (std::size_t i = 0; i < 20; ++i) {  // before the drives are started nothing is missing
+    run.samples[i].mode = Mode::Off;
+    run.samples[i].missed_feedback = static_cast<std::uint32_t>(i + 1);
+  }
   run.samples[901].fault = Fault::ForceLimit;
   const Summary s = summarise(run.info, run.samples);
   EXPECT_EQ(s.lost_ticks, 31u);
