@@ -1,6 +1,6 @@
 #include <fmt/format.h>
-#include <stdlib.h>
 #include <unistd.h>
+#include <cstdlib>
 
 #include <algorithm>
 #include <cerrno>
@@ -233,7 +233,7 @@ class Scratch {
  public:
   explicit Scratch(const fs::path& parent) {
     std::string name = (parent / ".report-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
+    if (::mkdtemp(name.data()) == nullptr) {
       throw ReportError("cannot write into " + parent.string() + ": " + std::strerror(errno) +
                         "; choose a run folder that exists and that you may write to");
     }
