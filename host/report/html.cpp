@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
-#include <cstdlib>
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
