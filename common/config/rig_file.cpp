@@ -346,7 +346,8 @@ Rig read_twin(const std::filesystem::path& file) {
   const Rig rig = read_rig(file);
   if (rig.kind != Kind::Twin) {
     Document::load(file).root().fail("kind", fmt::format("a handle that moves in x, y and rotation needs a twin; take ubc_twin, or look "
-                                                         "at this rig with: trocar rig info {}", file.string()));
+                                                         "at this rig with: trocar rig info {}",
+                                                         file.string()));
   }
   return rig;
 }

@@ -15,7 +15,7 @@ constexpr std::array<const char*, 6> phase_names{"prepare", "air", "touch", "ins
 constexpr double turn_speed_rad_s = 0.5;
 constexpr double reply_timeout_s = 3.0;  // beyond what the step itself should take, twice over
 constexpr std::int64_t ask_again_after_ns = 200'000'000;
-constexpr double lead_s = 0.6;           // start and end of a jerk-limited move, with round trip
+constexpr double lead_s = 0.6;  // start and end of a jerk-limited move, with round trip
 
 }  // namespace
 
@@ -66,7 +66,8 @@ Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, c
         planned_gains_ = "thesis";
       }
     if (planned_gains_ != "thesis")
-      throw std::invalid_argument(fmt::format("rig {} has no gain set named thesis: add one to its file, or set thesis_check = false", rig.name.data()));
+      throw std::invalid_argument(
+          fmt::format("rig {} has no gain set named thesis: add one to its file, or set thesis_check = false", rig.name.data()));
     add_insertion(fmt::format("thesis gains, {:g} mm/s", 1e3 * e.thesis_speed_m_s), x, e.thesis_speed_m_s);
     add(PhaseKind::Prepare, "default gains", CommandKind::SelectGains, 0.1);
     planned_gains_ = rig.gain_set[0].name.data();
@@ -92,11 +93,12 @@ void Sequencer::add_move(PhaseKind kind, std::string name, double x_m, double ti
   const double y_m = placement_.surface_y_m + tip_depth_m - placement_.needle_length_m;
   const auto& l = rig_.limits;
   if (x_m < l.workspace_x_m[0] || x_m > l.workspace_x_m[1] || y_m < l.workspace_y_m[0] || y_m > l.workspace_y_m[1])
-    throw std::invalid_argument(fmt::format(
-        "{}: the needle base would have to go to ({:.1f}, {:.1f}) mm, outside of the workspace x {:.1f} … {:.1f}, y {:.1f} … {:.1f} mm of rig {}: "
-        "lower depth_m or lane_spacing_m, or move the tissue",
-        name, 1e3 * x_m, 1e3 * y_m, 1e3 * l.workspace_x_m[0], 1e3 * l.workspace_x_m[1], 1e3 * l.workspace_y_m[0], 1e3 * l.workspace_y_m[1],
-        rig_.name.data()));
+    throw std::invalid_argument(
+        fmt::format("{}: the needle base would have to go to ({:.1f}, {:.1f}) mm, outside of the workspace x {:.1f} … {:.1f}, y {:.1f} … "
+                    "{:.1f} mm of rig {}: "
+                    "lower depth_m or lane_spacing_m, or move the tissue",
+                    name, 1e3 * x_m, 1e3 * y_m, 1e3 * l.workspace_x_m[0], 1e3 * l.workspace_x_m[1], 1e3 * l.workspace_y_m[0],
+                    1e3 * l.workspace_y_m[1], rig_.name.data()));
   add(kind, std::move(name), CommandKind::Move, std::hypot(x_m - planned_[0], y_m - planned_[1]) / speed_m_s + lead_s);
   planned_ = {x_m, y_m};
   Step& s = steps_.back();
@@ -133,7 +135,8 @@ void Sequencer::on_reply(const Reply& reply) {
   if (finished() || !sent_ || reply.session != session_ || reply.id != steps_[step_].command.id) return;
   const Step& s = steps_[step_];
   switch (reply.code) {
-    case ReplyCode::Accepted: return;
+    case ReplyCode::Accepted:
+      return;
     case ReplyCode::Done:
       if (s.must_stop_early) {
         fail(fmt::format("{}: no force above {:g} N was felt before the end of the move: is the tissue where the scene says?", s.phase.name,
@@ -144,7 +147,8 @@ void Sequencer::on_reply(const Reply& reply) {
       return;
     case ReplyCode::Stopped:
       if (s.may_stop_early && mode_ == Mode::Position) {
-        notes_.push_back(fmt::format("{}: contact felt at {:.2f} mm below the entry face of the scene", s.phase.name, 1e3 * tip_depth_m(last_)));
+        notes_.push_back(
+            fmt::format("{}: contact felt at {:.2f} mm below the entry face of the scene", s.phase.name, 1e3 * tip_depth_m(last_)));
         advance();
         return;
       }
@@ -179,7 +183,8 @@ void Sequencer::on_sample(const Sample& sample) {
   if (s.wait_s > 0.0) {
     if (elapsed_s >= s.wait_s) advance();
   } else if (elapsed_s > 2.0 * s.expected_s + reply_timeout_s) {
-    fail(fmt::format("{}: no answer to {} for {:.1f} s (mode {})", s.phase.name, trocar::to_string(s.command.kind), elapsed_s, trocar::to_string(mode_)));
+    fail(fmt::format("{}: no answer to {} for {:.1f} s (mode {})", s.phase.name, trocar::to_string(s.command.kind), elapsed_s,
+                     trocar::to_string(mode_)));
   }
 }
 

@@ -15,17 +15,17 @@ namespace trocar::experiment {
 
 struct Experiment {
   std::string name;
-  std::string rig, scene, plant;           // names in share, or paths
-  std::vector<double> speeds_m_s;          // one insertion each, side by side
-  double depth_m{};                        // of the tip below the entry face
-  double standoff_m{};                     // tip in front of the entry face between insertions
-  double lane_spacing_m{};                 // between the insertions, across the needle
-  double approach_speed_m_s{};             // in the air
+  std::string rig, scene, plant;   // names in share, or paths
+  std::vector<double> speeds_m_s;  // one insertion each, side by side
+  double depth_m{};                // of the tip below the entry face
+  double standoff_m{};             // tip in front of the entry face between insertions
+  double lane_spacing_m{};         // between the insertions, across the needle
+  double approach_speed_m_s{};     // in the air
   double touch_speed_m_s{};
-  double touch_force_n{};                  // base force that counts as contact
+  double touch_force_n{};  // base force that counts as contact
   double withdraw_speed_m_s{};
-  double dwell_s{};                        // at full depth
-  bool thesis_check{};                     // one more insertion with the gain set "thesis"
+  double dwell_s{};     // at full depth
+  bool thesis_check{};  // one more insertion with the gain set "thesis"
   double thesis_speed_m_s{};
 };
 
@@ -62,7 +62,7 @@ class Sequencer {
   [[nodiscard]] bool finished() const noexcept { return step_ == steps_.size() || failed(); }
   [[nodiscard]] bool failed() const noexcept { return !failure_.empty(); }
   [[nodiscard]] const std::string& failure() const noexcept { return failure_; }  // what happened, for a person
-  [[nodiscard]] double progress() const noexcept;                                // 0 … 1 of the expected time
+  [[nodiscard]] double progress() const noexcept;                                 // 0 … 1 of the expected time
   [[nodiscard]] double expected_s() const noexcept { return expected_total_s_; }
   [[nodiscard]] const std::string& phase_name() const noexcept;
   [[nodiscard]] double tip_depth_m(const Sample& sample) const noexcept;
@@ -73,7 +73,7 @@ class Sequencer {
   struct Step {
     Phase phase;
     Command command;
-    double wait_s{};      // instead of a command
+    double wait_s{};  // instead of a command
     double expected_s{};
     bool may_stop_early{};
     bool must_stop_early{};

@@ -50,23 +50,26 @@ Experiment read_experiment(const std::filesystem::path& file) {
 
 void write_run(const std::filesystem::path& folder, const Run& run) {
   std::string s;
-  s += fmt::format("experiment = {}\nrig = {}\nscene = {}\nlockstep = {}\n", quoted(run.experiment), quoted(run.rig), quoted(run.scene), run.lockstep);
-  s += fmt::format("surface_y_m = {:.17g}\ncentre_x_m = {:.17g}\nneedle_length_m = {:.17g}\n", run.placement.surface_y_m, run.placement.centre_x_m,
-                   run.placement.needle_length_m);
+  s += fmt::format("experiment = {}\nrig = {}\nscene = {}\nlockstep = {}\n", quoted(run.experiment), quoted(run.rig), quoted(run.scene),
+                   run.lockstep);
+  s += fmt::format("surface_y_m = {:.17g}\ncentre_x_m = {:.17g}\nneedle_length_m = {:.17g}\n", run.placement.surface_y_m,
+                   run.placement.centre_x_m, run.placement.needle_length_m);
   s += fmt::format("thesis_stiffness_n_per_m = {:.17g}\nsimulated_s = {:.17g}\nwall_s = {:.17g}\ncompleted = {}\n",
                    run.thesis_stiffness_n_per_m, run.simulated_s, run.wall_s, run.completed);
   if (!run.outcome.empty()) s += fmt::format("outcome = {}\n", quoted(run.outcome));
   for (const auto& note : run.notes) s += fmt::format("\n[[note]]\ntext = {}\n", quoted(note));
   for (const Phase& p : run.phases)
-    s += fmt::format("\n[[phase]]\nname = {}\nkind = \"{}\"\nspeed_m_s = {:.17g}\ngain_set = {}\nfirst_tick = {}\nlast_tick = {}\n", quoted(p.name),
-                     to_string(p.kind), p.speed_m_s, quoted(p.gain_set), p.first_tick, p.last_tick);
+    s += fmt::format("\n[[phase]]\nname = {}\nkind = \"{}\"\nspeed_m_s = {:.17g}\ngain_set = {}\nfirst_tick = {}\nlast_tick = {}\n",
+                     quoted(p.name), to_string(p.kind), p.speed_m_s, quoted(p.gain_set), p.first_tick, p.last_tick);
   const auto path = folder / "run.toml";
   const auto aside = folder / ".run.toml.part";
   {
     std::ofstream out(aside);
     out << s;
     out.flush();
-    if (!out) throw config::UserError(fmt::format("{}: cannot be written ({}): give a folder with room that you may write to", path.string(), std::strerror(errno)));
+    if (!out)
+      throw config::UserError(
+          fmt::format("{}: cannot be written ({}): give a folder with room that you may write to", path.string(), std::strerror(errno)));
   }
   std::filesystem::rename(aside, path);
 }

@@ -22,12 +22,12 @@ struct Run {
   double simulated_s{};
   double wall_s{};
   bool completed{};
-  std::string outcome;                // why not, when not completed
+  std::string outcome;  // why not, when not completed
   std::vector<Phase> phases;
   std::vector<std::string> notes;
 };
 
-void write_run(const std::filesystem::path& folder, const Run& run);      // FOLDER/run.toml, written aside and renamed
+void write_run(const std::filesystem::path& folder, const Run& run);  // FOLDER/run.toml, written aside and renamed
 [[nodiscard]] Run read_run(const std::filesystem::path& folder);
 
 }  // namespace trocar::experiment

@@ -17,9 +17,9 @@ namespace trocar::bridge {
 
 namespace {
 
-constexpr std::chrono::milliseconds period{5};           // a command waits at most this long for its tick
+constexpr std::chrono::milliseconds period{5};  // a command waits at most this long for its tick
 constexpr std::int64_t status_period_ns = 100'000'000;
-constexpr std::size_t batch = 20;                        // 50 messages a second at 1 kHz
+constexpr std::size_t batch = 20;  // 50 messages a second at 1 kHz
 
 std::int64_t realtime_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -31,19 +31,32 @@ std::int64_t monotonic_ns() {
 std::string refusal(ReplyCode code, Mode mode) {
   switch (code) {
     case ReplyCode::Accepted:
-    case ReplyCode::Done: return {};
-    case ReplyCode::Stopped: return "the motion ended before its target";
-    case ReplyCode::WrongMode: return fmt::format("not possible in mode {}", to_string(mode));
-    case ReplyCode::SessionTaken: return "another commander is armed: it has to disarm or go silent first (hold and stop are open to all)";
-    case ReplyCode::NoSession: return "arm first: only the armed commander may do this";
-    case ReplyCode::NotHomed: return "home first, with the handle in its jig";
-    case ReplyCode::NotAtRest: return "wait until the handle is at rest";
-    case ReplyCode::OutOfRange: return "a value is not finite, or lies outside of the workspace or limits";
-    case ReplyCode::UnreachablePose: return "a pose on the way is out of reach or close to a singularity";
-    case ReplyCode::Expired: return "the command arrived after its deadline";
-    case ReplyCode::WrongVersion: return fmt::format("this rig speaks protocol {}: install the same version of trocar on both sides", protocol_version);
-    case ReplyCode::UnknownGains: return "no such gain set in the rig file";
-    case ReplyCode::StillFaulty: return "the drives are not operational yet";
+    case ReplyCode::Done:
+      return {};
+    case ReplyCode::Stopped:
+      return "the motion ended before its target";
+    case ReplyCode::WrongMode:
+      return fmt::format("not possible in mode {}", to_string(mode));
+    case ReplyCode::SessionTaken:
+      return "another commander is armed: it has to disarm or go silent first (hold and stop are open to all)";
+    case ReplyCode::NoSession:
+      return "arm first: only the armed commander may do this";
+    case ReplyCode::NotHomed:
+      return "home first, with the handle in its jig";
+    case ReplyCode::NotAtRest:
+      return "wait until the handle is at rest";
+    case ReplyCode::OutOfRange:
+      return "a value is not finite, or lies outside of the workspace or limits";
+    case ReplyCode::UnreachablePose:
+      return "a pose on the way is out of reach or close to a singularity";
+    case ReplyCode::Expired:
+      return "the command arrived after its deadline";
+    case ReplyCode::WrongVersion:
+      return fmt::format("this rig speaks protocol {}: install the same version of trocar on both sides", protocol_version);
+    case ReplyCode::UnknownGains:
+      return "no such gain set in the rig file";
+    case ReplyCode::StillFaulty:
+      return "the drives are not operational yet";
   }
   return {};
 }
@@ -51,7 +64,14 @@ std::string refusal(ReplyCode code, Mode mode) {
 }  // namespace
 
 struct Bridge::Entities {
-  explicit Entities(std::uint32_t domain) : participant(domain), samples(participant), status(participant), events(participant), replies(participant), commands(participant), wait(participant) {
+  explicit Entities(std::uint32_t domain)
+      : participant(domain),
+        samples(participant),
+        status(participant),
+        events(participant),
+        replies(participant),
+        commands(participant),
+        wait(participant) {
     wait.add(commands.entity());
   }
   wire::Participant participant;
@@ -65,10 +85,7 @@ struct Bridge::Entities {
 };
 
 Bridge::Bridge(const rig::Rig& rig, controller::Mailboxes& mail, Shared& shared)
-    : rig_(rig),
-      mail_(mail),
-      shared_(shared),
-      entities_(std::make_unique<Entities>(rig.dds_domain)) {
+    : rig_(rig), mail_(mail), shared_(shared), entities_(std::make_unique<Entities>(rig.dds_domain)) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -103,8 +120,12 @@ void Bridge::take_commands() {
     const ReplyCode code = wire::from_wire(received, std::span(names).first(rig_.gain_sets), realtime_ns(), command);
     if (code == ReplyCode::Accepted && mail_.commands.push(command)) return;
     if (code == ReplyCode::Accepted) ++commands_lost_;
-    Reply refused{received.session, received.id, static_cast<CommandKind>(received.kind), code == ReplyCode::Accepted ? ReplyCode::Expired : code,
-                  snapshot_.status.mode, snapshot_.status.tick};
+    Reply refused{received.session,
+                  received.id,
+                  static_cast<CommandKind>(received.kind),
+                  code == ReplyCode::Accepted ? ReplyCode::Expired : code,
+                  snapshot_.status.mode,
+                  snapshot_.status.tick};
     (void)entities_->replies.write(wire::to_wire(refused, refusal(refused.code, refused.mode)));
   });
 }
@@ -130,13 +151,16 @@ void Bridge::publish_rest() {
     if (event.kind == EventKind::FaultLatched) {
       const auto& row = safety::row(event.fault);
       text = fmt::format("{}: {:.6g}, limit {:.6g}; {}", row.cause, event.value, event.limit, row.remedy);
-      fault_text_ = fmt::format("{}: {} ({:.6g}, limit {:.6g}); {}", to_string(event.fault), row.cause, event.value, event.limit, row.remedy);
+      fault_text_ =
+          fmt::format("{}: {} ({:.6g}, limit {:.6g}); {}", to_string(event.fault), row.cause, event.value, event.limit, row.remedy);
     }
-    if (event.kind == EventKind::HostLost) text = fmt::format("no sign of life from the armed host for {:.0f} ms: holding", 1e3 * event.value);
+    if (event.kind == EventKind::HostLost)
+      text = fmt::format("no sign of life from the armed host for {:.0f} ms: holding", 1e3 * event.value);
     (void)entities_->events.write(wire::to_wire(event, text));
     next_status_ns_ = 0;
   }
-  while (shared_.snapshots.pop(snapshot_)) {}
+  while (shared_.snapshots.pop(snapshot_)) {
+  }
   const std::int64_t now = monotonic_ns();
   if (now < next_status_ns_) return;
   next_status_ns_ = now + status_period_ns;

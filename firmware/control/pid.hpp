@@ -13,7 +13,8 @@ struct PidState {
 };
 
 // error, error_rate: setpoint minus measurement. limit > 0: |u| stays within it.
-[[nodiscard]] inline double update(const rig::AxisGains& gains, PidState& state, double error, double error_rate, double limit, double dt_s) noexcept {
+[[nodiscard]] inline double update(const rig::AxisGains& gains, PidState& state, double error, double error_rate, double limit,
+                                   double dt_s) noexcept {
   const double without_integral = gains.proportional * error + gains.derivative * error_rate;
   const double grown = state.integral + gains.integral * error * dt_s;
   // Integrate freely inside the limit; at the limit only towards the inside.

@@ -14,7 +14,7 @@ struct PathState {
 };
 
 struct PathLimits {
-  double velocity{};      // all > 0, in path units per s, s^2, s^3
+  double velocity{};  // all > 0, in path units per s, s^2, s^3
   double acceleration{};
   double jerk{};
 };

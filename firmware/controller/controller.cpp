@@ -19,17 +19,17 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t ns_per_ms = 1'000'000;
 constexpr std::int64_t enable_timeout_ns = 1000 * ns_per_ms;  // a drive walks its CiA 402 states in a few tens of ms
 constexpr std::uint32_t rest_ticks_needed = 50;
-constexpr std::int32_t rest_counts = 2;                       // encoder flicker that still counts as rest
-constexpr std::uint32_t tare_ticks = 250;                     // 12.5 mN of sensor noise average to 0.8 mN
+constexpr std::int32_t rest_counts = 2;    // encoder flicker that still counts as rest
+constexpr std::uint32_t tare_ticks = 250;  // 12.5 mN of sensor noise average to 0.8 mN
 constexpr std::size_t commands_per_tick = 4;
 constexpr int path_checks = 16;
-constexpr double velocity_bandwidth_rad_s = 300.0;            // one count of 40 um disturbs the velocity by 4 mm/s
+constexpr double velocity_bandwidth_rad_s = 300.0;  // one count of 40 um disturbs the velocity by 4 mm/s
 // The needle's load is measured at the base and fed forward. Its low-pass lags, so of a tissue stiffness k it leaves the positive
 // damping k / bandwidth in the loop; 60 rad/s keeps that below the PID's own for k of a phantom, and the noise at 2 mN.
 constexpr double load_bandwidth_rad_s = 60.0;
-constexpr double longest_step_s = 0.005;                      // after a stall the reference goes on slowly instead of jumping
-constexpr double jump_factor = 4.0;                           // motion per tick beyond this many times the velocity fault is no motion
-constexpr double friction_smoothing_rad_s = 0.01;             // joint speed at which the fed-forward Coulomb friction is at 76 %
+constexpr double longest_step_s = 0.005;           // after a stall the reference goes on slowly instead of jumping
+constexpr double jump_factor = 4.0;                // motion per tick beyond this many times the velocity fault is no motion
+constexpr double friction_smoothing_rad_s = 0.01;  // joint speed at which the fed-forward Coulomb friction is at 76 %
 
 }  // namespace
 
@@ -103,7 +103,8 @@ void Controller::observe() noexcept {
   }
   if (pose_valid_) {
     const control::VelocityObserverConfig config{velocity_bandwidth_rad_s};
-    for (Eigen::Index i = 0; i < 3; ++i) velocity_[i] = control::update(config, velocity_observer_[static_cast<std::size_t>(i)], state_.x[i], dt_s_);
+    for (Eigen::Index i = 0; i < 3; ++i)
+      velocity_[i] = control::update(config, velocity_observer_[static_cast<std::size_t>(i)], state_.x[i], dt_s_);
   }
   observe_force();
 }
@@ -134,7 +135,8 @@ void Controller::execute(const Command& command) noexcept {
   const bool mine = command.session != 0 && command.session == session_;
   ReplyCode code = ReplyCode::Accepted;
   switch (command.kind) {
-    case CommandKind::KeepAlive: return;  // answered by silence: it comes fifty times a second
+    case CommandKind::KeepAlive:
+      return;  // answered by silence: it comes fifty times a second
     case CommandKind::Stop:
       if (position_controlled()) {
         motion_end_ = ReplyCode::Stopped;
@@ -150,7 +152,9 @@ void Controller::execute(const Command& command) noexcept {
       code = safety::has_torque(mode_) ? ReplyCode::Done : ReplyCode::WrongMode;
       if (safety::has_torque(mode_)) hold_here();
       break;
-    case CommandKind::Home: code = session_ != 0 && !mine ? ReplyCode::SessionTaken : home(); break;
+    case CommandKind::Home:
+      code = session_ != 0 && !mine ? ReplyCode::SessionTaken : home();
+      break;
     case CommandKind::Tare:
       if (session_ != 0 && !mine) {
         code = ReplyCode::SessionTaken;
@@ -166,7 +170,9 @@ void Controller::execute(const Command& command) noexcept {
         tare_sum_.setZero();
       }
       break;
-    case CommandKind::Arm: code = arm(command); break;
+    case CommandKind::Arm:
+      code = arm(command);
+      break;
     case CommandKind::Disarm:
       if (!mine) {
         code = session_ != 0 ? ReplyCode::SessionTaken : ReplyCode::NoSession;
@@ -179,7 +185,9 @@ void Controller::execute(const Command& command) noexcept {
         code = ReplyCode::Done;
       }
       break;
-    case CommandKind::Move: code = move(command); break;
+    case CommandKind::Move:
+      code = move(command);
+      break;
     case CommandKind::SelectGains:
       if (session_ != 0 && !mine) {
         code = ReplyCode::SessionTaken;
@@ -195,8 +203,12 @@ void Controller::execute(const Command& command) noexcept {
         code = ReplyCode::Done;
       }
       break;
-    case CommandKind::ResetFault: code = session_ != 0 && !mine ? ReplyCode::SessionTaken : reset_fault(); break;
-    default: code = ReplyCode::WrongVersion; break;
+    case CommandKind::ResetFault:
+      code = session_ != 0 && !mine ? ReplyCode::SessionTaken : reset_fault();
+      break;
+    default:
+      code = ReplyCode::WrongVersion;
+      break;
   }
   reply(command.session, command.id, command.kind, code);
 }

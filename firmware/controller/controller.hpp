@@ -120,7 +120,7 @@ class Controller {
   mechanism::Vec3 sensor_wrench_ = mechanism::Vec3::Zero();  // needle frame: along, across, moment; tare not removed
   mechanism::Vec3 tare_ = mechanism::Vec3::Zero();           // needle frame
   mechanism::Vec3 base_wrench_ = mechanism::Vec3::Zero();    // rig frame, tare removed
-  mechanism::Vec3 load_ = mechanism::Vec3::Zero();         // base_wrench_, low-passed
+  mechanism::Vec3 load_ = mechanism::Vec3::Zero();           // base_wrench_, low-passed
   bool tared_{};
 
   // what runs
@@ -129,15 +129,15 @@ class Controller {
   std::uint64_t session_{};
   safety::Watchdog host_;
   safety::Watchdog enabling_;
-  Command motion_command_{};   // Move that runs, kind KeepAlive when none
-  Command tare_command_{};     // Tare that runs
+  Command motion_command_{};  // Move that runs, kind KeepAlive when none
+  Command tare_command_{};    // Tare that runs
   std::uint32_t tare_ticks_{};
   mechanism::Vec3 tare_sum_ = mechanism::Vec3::Zero();
-  Command arm_command_{};      // Arm that waits for the drives
+  Command arm_command_{};  // Arm that waits for the drives
   ReplyCode motion_end_{ReplyCode::Done};
-  bool stopping_{};            // braking, torque off at rest
-  bool held_{};                // in Fault: the reaction keeps the handle under position control
-  bool counts_doubtful_{};     // since a fault the counts may no longer mean what they meant: home again
+  bool stopping_{};         // braking, torque off at rest
+  bool held_{};             // in Fault: the reaction keeps the handle under position control
+  bool counts_doubtful_{};  // since a fault the counts may no longer mean what they meant: home again
   std::uint32_t last_move_id_{};
   control::Motion motion_{};
   std::array<control::PidState, 3> pid_{};

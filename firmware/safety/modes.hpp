@@ -16,8 +16,8 @@ enum class Trigger : std::uint8_t {
   LinkDown,       // drives left operation while there was no torque
   TorqueEnabled,  // the drives confirmed an Arm command
   MoveAccepted,
-  HoldAsked,      // hold command, or the armed host went silent
-  TorqueOffAsked, // disarm command, or a stop that has come to rest
+  HoldAsked,       // hold command, or the armed host went silent
+  TorqueOffAsked,  // disarm command, or a stop that has come to rest
   FaultRaised,
   FaultReset,
 };

@@ -19,7 +19,8 @@ struct GateState {
 };
 
 // Torques that may be sent. When one value is not finite, all are zero and false is returned.
-[[nodiscard]] inline bool pass(const rig::Rig& rig, GateState& state, const JointTorques& wanted_nm, double dt_s, JointTorques& out_nm) noexcept {
+[[nodiscard]] inline bool pass(const rig::Rig& rig, GateState& state, const JointTorques& wanted_nm, double dt_s,
+                               JointTorques& out_nm) noexcept {
   for (std::size_t i = 0; i < rig.drives(); ++i) {
     if (!std::isfinite(wanted_nm[i])) {
       ++state.not_finite;

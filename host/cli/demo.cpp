@@ -41,9 +41,11 @@ class ProgressLine {
     constexpr int width = 20;
     const auto filled = static_cast<std::size_t>(std::lround(width * p.fraction));
     const int left = static_cast<int>(p.remaining_s);
-    fmt::print(stderr, "\r[{}{}] {:3.0f} %  {:<28.28} depth {:6.2f} mm  force {:6.3f} N  tick p99 {:3.0f} us  {:<8}  faults {}  {}:{:02} left \033[K",
-               std::string(filled, '#'), std::string(width - filled, '.'), 100.0 * p.fraction, p.phase, p.depth_mm, p.force_n, p.tick_p99_us,
-               to_string(p.mode), p.faults, left / 60, left % 60);
+    fmt::print(
+        stderr,
+        "\r[{}{}] {:3.0f} %  {:<28.28} depth {:6.2f} mm  force {:6.3f} N  tick p99 {:3.0f} us  {:<8}  faults {}  {}:{:02} left \033[K",
+        std::string(filled, '#'), std::string(width - filled, '.'), 100.0 * p.fraction, p.phase, p.depth_mm, p.force_n, p.tick_p99_us,
+        to_string(p.mode), p.faults, left / 60, left % 60);
     std::fflush(stderr);
     shown_ = true;
   }
@@ -63,7 +65,9 @@ std::filesystem::path make_folder(std::filesystem::path out) {
   std::error_code error;
   std::filesystem::create_directories(out, error);
   if (!error && access(out.c_str(), W_OK | X_OK) != 0) error.assign(errno, std::generic_category());
-  if (error) throw config::UserError(fmt::format("{}: cannot write there ({}): give a folder that you may write to with --out", out.string(), error.message()));
+  if (error)
+    throw config::UserError(
+        fmt::format("{}: cannot write there ({}): give a folder that you may write to with --out", out.string(), error.message()));
   for (const char* name : {"capture.mcap", "samples.csv", "run.toml", "report.html"})
     if (std::filesystem::exists(out / name))
       throw config::UserError(fmt::format("{}: holds {} of an earlier run: give another folder with --out, or none", out.string(), name));
@@ -71,7 +75,8 @@ std::filesystem::path make_folder(std::filesystem::path out) {
 }
 
 int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const std::filesystem::path& out, std::atomic<bool>& stop) {
-  std::vector<std::string> arguments{"--experiment", options.experiment, "--out", out.string(), "--seed", std::to_string(options.seed), "--progress"};
+  std::vector<std::string> arguments{"--experiment", options.experiment,           "--out",     out.string(),
+                                     "--seed",       std::to_string(options.seed), "--progress"};
   if (!options.speeds_mm_s.empty()) {
     arguments.push_back("--speeds");
     arguments.push_back(fmt::format("{}", fmt::join(options.speeds_mm_s, ",")));
@@ -106,19 +111,22 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
   return code;
 }
 
-int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out, std::atomic<bool>& stop) {
+int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out,
+                  std::atomic<bool>& stop) {
   const std::uint32_t domain = options.domain >= 0 ? static_cast<std::uint32_t>(options.domain) : setup.rig.dds_domain;
   std::optional<Process> plant, rig, recorder;
   if (options.own_rig) {
-    std::vector<std::string> plant_arguments{"--rig",  setup.rig_file.string(), "--scene", setup.scene_file.string(), "--seed", std::to_string(options.seed),
-                                             "--die-with-parent"};
+    std::vector<std::string> plant_arguments{"--rig",  setup.rig_file.string(),      "--scene",          setup.scene_file.string(),
+                                             "--seed", std::to_string(options.seed), "--die-with-parent"};
     if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
     plant.emplace("trocar-plant", plant_arguments);
     plant->wait_for_line("before scene", ready_s);
-    rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain), "--best-effort", "--die-with-parent"});
+    rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain),
+                                                       "--best-effort", "--die-with-parent"});
     rig->wait_for_line("DDS domain", ready_s);
   }
-  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain", std::to_string(domain), "--die-with-parent"});
+  recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain",
+                                                      std::to_string(domain), "--die-with-parent"});
   recorder->wait_for_line("recording to", ready_s);
 
   ProgressLine line;
@@ -164,12 +172,18 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
   using From = experiment::PhaseKind;
   using To = report::Phase::Kind;
   switch (kind) {
-    case From::Air: return To::Air;
-    case From::Touch: return To::Touch;
-    case From::Insert: return To::Insert;
-    case From::Dwell: return To::Dwell;
-    case From::Withdraw: return To::Withdraw;
-    case From::Prepare: return To::Other;
+    case From::Air:
+      return To::Air;
+    case From::Touch:
+      return To::Touch;
+    case From::Insert:
+      return To::Insert;
+    case From::Dwell:
+      return To::Dwell;
+    case From::Withdraw:
+      return To::Withdraw;
+    case From::Prepare:
+      return To::Other;
   }
   return To::Other;
 }
@@ -183,11 +197,11 @@ void print_summary(const report::Summary& s) {
     if (g.phantom.ticks > 0) fmt::print("tracking RMS in phantom, {:<9} {:.3f} mm\n", g.gain_set, 1e3 * g.phantom.rms_m);
   }
   for (const auto& g : s.sags)
-    fmt::print("sag, {:<29} {:.2f} mm; F/Kp is {:.2f} mm for the {:.2f} N at the base, {:.2f} mm with the friction of the mechanism\n", g.phase, 1e3 * g.error_m,
-               1e3 * g.expected_m, g.force_n, 1e3 * g.expected_command_m);
+    fmt::print("sag, {:<29} {:.2f} mm; F/Kp is {:.2f} mm for the {:.2f} N at the base, {:.2f} mm with the friction of the mechanism\n",
+               g.phase, 1e3 * g.error_m, 1e3 * g.expected_m, g.force_n, 1e3 * g.expected_command_m);
   if (s.tick_us.count > 0)
-    fmt::print("tick p50 {:.0f} us, p99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us\n", s.tick_us.p50, s.tick_us.p99, s.wakeup_late_us.p50,
-               s.wakeup_late_us.p99);
+    fmt::print("tick p50 {:.0f} us, p99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us\n", s.tick_us.p50, s.tick_us.p99,
+               s.wakeup_late_us.p50, s.wakeup_late_us.p99);
   fmt::print("{} samples, {} lost, {} ticks without feedback, faults: {}\n", s.samples, s.lost_ticks, s.ticks_without_feedback,
              s.faults.empty() ? "none" : fmt::format("{}", fmt::join(s.faults, ", ")));
 }
@@ -215,7 +229,9 @@ int make_report(const std::filesystem::path& folder, bool json) {
     info.phases.push_back({p.name, report_kind(p.kind), back ? insertion_speed_m_s : p.speed_m_s, p.gain_set, p.first_tick, p.last_tick});
   }
   if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
-  if (run.lockstep) info.notes.push_back(fmt::format("{:.1f} s simulated in {:.1f} s, {:.1f} times real time", run.simulated_s, run.wall_s, run.simulated_s / run.wall_s));
+  if (run.lockstep)
+    info.notes.push_back(
+        fmt::format("{:.1f} s simulated in {:.1f} s, {:.1f} times real time", run.simulated_s, run.wall_s, run.simulated_s / run.wall_s));
   const report::Summary summary = report::summarise(info, log.samples);
   report::write_report(info, summary, log.samples);
   if (json) {

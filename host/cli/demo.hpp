@@ -11,12 +11,12 @@ namespace trocar::cli {
 
 struct DemoOptions {
   std::string experiment = "insertion";
-  std::vector<double> speeds_mm_s;   // empty: the experiment's own
-  std::filesystem::path out;         // empty: runs/<time>
-  bool lockstep{};                   // on the bench instead of processes
-  bool own_rig{true};                // start plant and controller; false: they run already
+  std::vector<double> speeds_mm_s;  // empty: the experiment's own
+  std::filesystem::path out;        // empty: runs/<time>
+  bool lockstep{};                  // on the bench instead of processes
+  bool own_rig{true};               // start plant and controller; false: they run already
   bool json{};
-  std::int64_t domain = -1;          // DDS domain instead of the rig file's
+  std::int64_t domain = -1;  // DDS domain instead of the rig file's
   std::uint64_t seed = 1;
 };
 

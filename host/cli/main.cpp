@@ -1,7 +1,7 @@
 // trocar: the host's command line.
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <CLI/CLI.hpp>
 
 #include <atomic>
 #include <csignal>
@@ -36,16 +36,21 @@ int main(int argc, char** argv) {
   const auto domain_of = [&] {
     return domain >= 0 ? static_cast<std::uint32_t>(domain) : config::read_rig(config::find_share("rigs", rig)).dds_domain;
   };
-  const auto with_domain = [&](CLI::App* c) { c->add_option("--domain", domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230)); };
+  const auto with_domain = [&](CLI::App* c) {
+    c->add_option("--domain", domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
+  };
   const auto with_experiment = [&](CLI::App* c, cli::DemoOptions& o) {
-    c->add_option("--speeds", o.speeds_mm_s, "insertion speeds in mm/s instead of the experiment's, such as 1,3,5,7,9")->delimiter(',')->check(CLI::Range(0.01, 200.0));
+    c->add_option("--speeds", o.speeds_mm_s, "insertion speeds in mm/s instead of the experiment's, such as 1,3,5,7,9")
+        ->delimiter(',')
+        ->check(CLI::Range(0.01, 200.0));
     c->add_option("--out", o.out, "folder for the results (default runs/<time>)");
     c->add_flag("--json", o.json, "the summary as JSON on stdout");
     with_domain(c);
   };
 
   cli::DemoOptions demo;
-  auto* demo_command = app.add_subcommand("demo", "the whole simulated experiment: plant, controller, recorder, report\nExample: trocar demo --speeds 1,9");
+  auto* demo_command =
+      app.add_subcommand("demo", "the whole simulated experiment: plant, controller, recorder, report\nExample: trocar demo --speeds 1,9");
   with_experiment(demo_command, demo);
   demo_command->add_option("--experiment", demo.experiment, "experiment name, or path of its TOML file")->capture_default_str();
   demo_command->add_flag("--lockstep", demo.lockstep, "on the bench: one process, virtual clock, repeatable to the bit");
@@ -67,7 +72,8 @@ int main(int argc, char** argv) {
     code = cli::run_demo(experiment, stop_asked);
   });
 
-  auto* record_command = app.add_subcommand("record", "record everything that a rig publishes to an MCAP file until Ctrl-C\nExample: trocar record --out run.mcap");
+  auto* record_command = app.add_subcommand(
+      "record", "record everything that a rig publishes to an MCAP file until Ctrl-C\nExample: trocar record --out run.mcap");
   host::RecordOptions record;
   record_command->add_option("--out", record.out, "a file that ends in .mcap, or a folder")->required();
   record_command->add_option("--rig", rig, "rig whose DDS domain to listen to")->capture_default_str();
@@ -84,7 +90,8 @@ int main(int argc, char** argv) {
     code = host::run_record(record, stop_asked);
   });
 
-  auto* report_command = app.add_subcommand("report", "make figures and report.html from the folder of a run\nExample: trocar report runs/2026-01-31_12-00-00");
+  auto* report_command = app.add_subcommand(
+      "report", "make figures and report.html from the folder of a run\nExample: trocar report runs/2026-01-31_12-00-00");
   std::filesystem::path folder;
   report_command->add_option("folder", folder, "folder of a run")->required();
   report_command->add_flag("--json", json, "the summary as JSON on stdout");
@@ -99,7 +106,8 @@ int main(int argc, char** argv) {
     c->add_flag("--json", json, "machine-readable, on stdout");
     c->callback([&, run] { code = run(); });
   };
-  add_rig("info", "what a rig file describes: workspace, resolution, forces, bus load\nExample: trocar rig info ubc_twin_haptic", [&] { return cli::rig_info(rig, json); });
+  add_rig("info", "what a rig file describes: workspace, resolution, forces, bus load\nExample: trocar rig info ubc_twin_haptic",
+          [&] { return cli::rig_info(rig, json); });
   add_rig("status", "what the running controller is doing", [&] { return cli::rig_status(domain_of(), json); });
   add_rig("home", "take the encoder offsets; the handle stands in its jig", [&] { return cli::rig_home(domain_of()); });
   add_rig("arm", "enable torque and stay armed until Ctrl-C", [&] { return cli::rig_arm(domain_of(), stop_asked); });

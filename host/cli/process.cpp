@@ -73,8 +73,10 @@ void Process::wait_for_line(const std::string& text, double timeout_s) {
   const double end = steady_s() + timeout_s;
   while (output_.find(text) == std::string::npos) {
     if (read(0.05).empty() && !running()) {
-      while (!read(0.0).empty()) {}
-      throw config::UserError(output_.empty() ? fmt::format("{} ended at once", name_) : output_.substr(0, output_.find_last_not_of('\n') + 1));
+      while (!read(0.0).empty()) {
+      }
+      throw config::UserError(output_.empty() ? fmt::format("{} ended at once", name_)
+                                              : output_.substr(0, output_.find_last_not_of('\n') + 1));
     }
     if (steady_s() > end) throw config::UserError(fmt::format("{} is not ready after {:g} s; it said: {}", name_, timeout_s, output_));
   }
@@ -99,7 +101,8 @@ int Process::wait(double timeout_s) {
     (void)read(0.02);
     if (steady_s() > end) ::kill(pid_, SIGKILL);
   }
-  while (!read(0.0).empty()) {}
+  while (!read(0.0).empty()) {
+  }
   return exit_code_;
 }
 

@@ -54,37 +54,47 @@ int rig_info(const std::string& name, bool json) {
   const mechanism::Rectangle box{r.limits.workspace_x_m, r.limits.workspace_y_m};
   const mechanism::Capability c = twin ? mechanism::capability(r.twin, drives, box) : mechanism::capability(r.twin.linkage[0], drives, box);
   if (c.status != mechanism::Status::Ok)
-    throw config::UserError(fmt::format("{}: [limits] workspace_x_m, workspace_y_m: part of this box is out of reach; make it smaller (the largest square is "
-                                        "{:.0f} mm around ({:.0f}, {:.0f}) mm)",
-                                        file.string(), 1e3 * square.side_m, 1e3 * square.centre_m[0], 1e3 * square.centre_m[1]));
+    throw config::UserError(
+        fmt::format("{}: [limits] workspace_x_m, workspace_y_m: part of this box is out of reach; make it smaller (the largest square is "
+                    "{:.0f} mm around ({:.0f}, {:.0f}) mm)",
+                    file.string(), 1e3 * square.side_m, 1e3 * square.centre_m[0], 1e3 * square.centre_m[1]));
   const rig::BusBudget budget = rig::bus_budget(r);
   if (json) {
-    fmt::print("{{\"name\": \"{}\", \"kind\": \"{}\", \"largest_square_m\": {}, \"largest_square_centre_m\": [{}, {}], \"workspace_x_m\": [{}, {}], "
-               "\"workspace_y_m\": [{}, {}], \"position_step_m\": {}, \"position_rms_m\": {}, \"angle_step_rad\": {}, \"peak_force_n\": {}, "
-               "\"continuous_force_n\": {}, \"mass_least_kg\": {}, \"mass_most_kg\": {}, \"inertia_kg_m2\": {}, \"drives_bus_percent\": {}, "
-               "\"drives_bus_peak_percent\": {}, \"sensor_bus_percent\": {}}}\n",
-               r.name.data(), twin ? "twin" : "single", square.side_m, square.centre_m[0], square.centre_m[1], box.x_m[0], box.x_m[1], box.y_m[0], box.y_m[1],
-               c.worst.position_step_m, c.worst.position_rms_m, c.worst.angle_step_rad, c.worst.peak_force_n, c.worst.continuous_force_n,
-               c.worst.mass_least_kg, c.worst.mass_most_kg, c.worst.inertia_kg_m2, budget.drives_cyclic_percent, budget.drives_peak_percent,
-               budget.sensor_percent);
+    fmt::print(
+        "{{\"name\": \"{}\", \"kind\": \"{}\", \"largest_square_m\": {}, \"largest_square_centre_m\": [{}, {}], \"workspace_x_m\": [{}, "
+        "{}], "
+        "\"workspace_y_m\": [{}, {}], \"position_step_m\": {}, \"position_rms_m\": {}, \"angle_step_rad\": {}, \"peak_force_n\": {}, "
+        "\"continuous_force_n\": {}, \"mass_least_kg\": {}, \"mass_most_kg\": {}, \"inertia_kg_m2\": {}, \"drives_bus_percent\": {}, "
+        "\"drives_bus_peak_percent\": {}, \"sensor_bus_percent\": {}}}\n",
+        r.name.data(), twin ? "twin" : "single", square.side_m, square.centre_m[0], square.centre_m[1], box.x_m[0], box.x_m[1], box.y_m[0],
+        box.y_m[1], c.worst.position_step_m, c.worst.position_rms_m, c.worst.angle_step_rad, c.worst.peak_force_n,
+        c.worst.continuous_force_n, c.worst.mass_least_kg, c.worst.mass_most_kg, c.worst.inertia_kg_m2, budget.drives_cyclic_percent,
+        budget.drives_peak_percent, budget.sensor_percent);
     return 0;
   }
-  fmt::print("{} ({}), {} drives\n\n", r.name.data(), twin ? "twin pantograph: x, y, unlimited rotation" : "single five-bar: x, y", r.drives());
-  fmt::print("largest square workspace, every orientation   {:.0f} x {:.0f} mm around ({:.0f}, {:.0f}) mm\n", 1e3 * square.side_m, 1e3 * square.side_m,
-             1e3 * square.centre_m[0], 1e3 * square.centre_m[1]);
-  fmt::print("workspace limits of the rig file              x {:.0f} … {:.0f} mm, y {:.0f} … {:.0f} mm\n\n", 1e3 * box.x_m[0], 1e3 * box.x_m[1], 1e3 * box.y_m[0],
-             1e3 * box.y_m[1]);
+  fmt::print("{} ({}), {} drives\n\n", r.name.data(), twin ? "twin pantograph: x, y, unlimited rotation" : "single five-bar: x, y",
+             r.drives());
+  fmt::print("largest square workspace, every orientation   {:.0f} x {:.0f} mm around ({:.0f}, {:.0f}) mm\n", 1e3 * square.side_m,
+             1e3 * square.side_m, 1e3 * square.centre_m[0], 1e3 * square.centre_m[1]);
+  fmt::print("workspace limits of the rig file              x {:.0f} … {:.0f} mm, y {:.0f} … {:.0f} mm\n\n", 1e3 * box.x_m[0],
+             1e3 * box.x_m[1], 1e3 * box.y_m[0], 1e3 * box.y_m[1]);
   fmt::print("worst place and direction within the limits, and in their centre:\n");
   fmt::print("  distance to singularity (0 … 1)             {:10.2f} {:10.2f}\n", c.worst.singularity, c.centre.singularity);
-  fmt::print("  position, one encoder count                 {:10.1f} {:10.1f} um\n", 1e6 * c.worst.position_step_m, 1e6 * c.centre.position_step_m);
-  fmt::print("  position, quantisation RMS                  {:10.1f} {:10.1f} um\n", 1e6 * c.worst.position_rms_m, 1e6 * c.centre.position_rms_m);
-  if (twin) fmt::print("  rotation, one encoder count                 {:10.3f} {:10.3f} deg\n", deg * c.worst.angle_step_rad, deg * c.centre.angle_step_rad);
-  fmt::print("  force, continuous, weakest direction        {:10.1f} {:10.1f} N\n", c.worst.continuous_force_n, c.centre.continuous_force_n);
+  fmt::print("  position, one encoder count                 {:10.1f} {:10.1f} um\n", 1e6 * c.worst.position_step_m,
+             1e6 * c.centre.position_step_m);
+  fmt::print("  position, quantisation RMS                  {:10.1f} {:10.1f} um\n", 1e6 * c.worst.position_rms_m,
+             1e6 * c.centre.position_rms_m);
+  if (twin)
+    fmt::print("  rotation, one encoder count                 {:10.3f} {:10.3f} deg\n", deg * c.worst.angle_step_rad,
+               deg * c.centre.angle_step_rad);
+  fmt::print("  force, continuous, weakest direction        {:10.1f} {:10.1f} N\n", c.worst.continuous_force_n,
+             c.centre.continuous_force_n);
   fmt::print("  force, peak, weakest direction              {:10.1f} {:10.1f} N\n", c.worst.peak_force_n, c.centre.peak_force_n);
   fmt::print("  moving mass, lightest … heaviest            {:.2f} … {:.2f} kg\n", c.worst.mass_least_kg, c.worst.mass_most_kg);
-  if (twin) fmt::print("  moment of inertia at the handle             {:10.5f} {:10.5f} kg m^2\n", c.worst.inertia_kg_m2, c.centre.inertia_kg_m2);
-  fmt::print("\nbus load at {:g} Hz, worst-case bit stuffing: drives {:.0f} % (peak {:.0f} %), sensor {:.0f} %{}\n", r.timing.tick_hz, budget.drives_cyclic_percent,
-             budget.drives_peak_percent, budget.sensor_percent, budget.fits() ? "" : ": DOES NOT FIT");
+  if (twin)
+    fmt::print("  moment of inertia at the handle             {:10.5f} {:10.5f} kg m^2\n", c.worst.inertia_kg_m2, c.centre.inertia_kg_m2);
+  fmt::print("\nbus load at {:g} Hz, worst-case bit stuffing: drives {:.0f} % (peak {:.0f} %), sensor {:.0f} %{}\n", r.timing.tick_hz,
+             budget.drives_cyclic_percent, budget.drives_peak_percent, budget.sensor_percent, budget.fits() ? "" : ": DOES NOT FIT");
   if (twin && std::string(r.name.data()) == "ubc_twin")
     fmt::print("\nthesis (3.1), for manipulation: > 100 x 100 mm, about 40 um and 0.05 deg, > 30 N peak, 12 N continuous\n");
   return 0;
@@ -96,10 +106,12 @@ int rig_status(std::uint32_t domain, bool json) {
   if (json) {
     std::string text;
     for (const char c : s.text) text += (c == '"' || c == '\\') ? fmt::format("\\{}", c) : std::string(1, c);
-    fmt::print("{{\"rig\": \"{}\", \"mode\": \"{}\", \"fault\": \"{}\", \"homed\": {}, \"tared\": {}, \"real_time\": {}, \"armed_by\": \"{:016x}\", \"tick\": {}, "
-               "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"gains\": \"{}\", \"text\": \"{}\"}}\n",
-               s.rig, to_string(s.mode), to_string(s.fault), s.homed, s.tared, s.real_time, s.session, s.tick, s.ticks_late, s.ticks_without_feedback, s.gain_set,
-               text);
+    fmt::print(
+        "{{\"rig\": \"{}\", \"mode\": \"{}\", \"fault\": \"{}\", \"homed\": {}, \"tared\": {}, \"real_time\": {}, \"armed_by\": "
+        "\"{:016x}\", \"tick\": {}, "
+        "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"gains\": \"{}\", \"text\": \"{}\"}}\n",
+        s.rig, to_string(s.mode), to_string(s.fault), s.homed, s.tared, s.real_time, s.session, s.tick, s.ticks_late,
+        s.ticks_without_feedback, s.gain_set, text);
     return 0;
   }
   fmt::print("{}: mode {}", s.rig, to_string(s.mode));
@@ -127,13 +139,13 @@ int rig_arm(std::uint32_t domain, std::atomic<bool>& stop) {
   bool lost = false;
   while (!stop.load() && !lost) {
     client.poll(0.01, {.status = [&](const host::RigStatus& s) {
-      if (s.mode != mode) {
-        fmt::print("mode {}{}\n", to_string(s.mode), s.text.empty() ? "" : ": " + s.text);
-        std::fflush(stdout);
-      }
-      mode = s.mode;
-      lost = s.mode == Mode::Off || s.mode == Mode::Fault || s.session != client.session();
-    }});
+                  if (s.mode != mode) {
+                    fmt::print("mode {}{}\n", to_string(s.mode), s.text.empty() ? "" : ": " + s.text);
+                    std::fflush(stdout);
+                  }
+                  mode = s.mode;
+                  lost = s.mode == Mode::Off || s.mode == Mode::Fault || s.session != client.session();
+                }});
     client.keep_alive();
   }
   if (lost) {

@@ -20,7 +20,7 @@ namespace {
 double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 constexpr double bring_up_s = 10.0;
-constexpr double silence_s = 2.0;   // no samples for this long: the rig is gone
+constexpr double silence_s = 2.0;  // no samples for this long: the rig is gone
 constexpr std::size_t p99_window = 1000;
 
 }  // namespace
@@ -50,11 +50,12 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
   const double begin = steady_s();
   const RigStatus first = client.wait_for_rig(bring_up_s);
   if (first.session != 0)
-    throw config::UserError(fmt::format("rig {} is held by another commander (mode {}): wait until it disarms, or stop it with: trocar rig stop", first.rig,
-                                        to_string(first.mode)));
+    throw config::UserError(
+        fmt::format("rig {} is held by another commander (mode {}): wait until it disarms, or stop it with: trocar rig stop", first.rig,
+                    to_string(first.mode)));
   if (first.rig != setup.rig.name.data())
-    throw config::UserError(fmt::format("the rig on DDS domain {} is {}, the experiment wants {}: start trocar-rig --rig {}", domain, first.rig,
-                                        setup.rig.name.data(), setup.rig.name.data()));
+    throw config::UserError(fmt::format("the rig on DDS domain {} is {}, the experiment wants {}: start trocar-rig --rig {}", domain,
+                                        first.rig, setup.rig.name.data(), setup.rig.name.data()));
 
   experiment::Sequencer sequencer(setup.experiment, setup.placement, setup.rig, client.session());
   Progress progress;

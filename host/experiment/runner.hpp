@@ -24,11 +24,11 @@ struct ExperimentSetup {
 
 struct Progress {
   std::string phase;
-  double fraction{};       // 0 … 1
+  double fraction{};  // 0 … 1
   double remaining_s{};
   double depth_mm{};
   double force_n{};
-  double tick_p99_us{};    // over the last second
+  double tick_p99_us{};  // over the last second
   Mode mode{};
   std::uint64_t faults{};
 };

@@ -31,16 +31,34 @@ std::uint64_t random_session() {
 }
 
 RigStatus from_wire(const wire::Status& s) {
-  if (const auto problem = wire::version_problem(fmt::format("rig {}", s.rig), s.protocol); !problem.empty()) throw config::UserError(problem);
-  return {s.rig,     static_cast<Mode>(s.mode), static_cast<Fault>(s.fault),      s.homed,           s.tared,   s.real_time, s.session,
-          s.tick, s.ticks_late,              s.ticks_without_feedback, s.commands_lost, s.gain_set, s.text};
+  if (const auto problem = wire::version_problem(fmt::format("rig {}", s.rig), s.protocol); !problem.empty())
+    throw config::UserError(problem);
+  return {s.rig,
+          static_cast<Mode>(s.mode),
+          static_cast<Fault>(s.fault),
+          s.homed,
+          s.tared,
+          s.real_time,
+          s.session,
+          s.tick,
+          s.ticks_late,
+          s.ticks_without_feedback,
+          s.commands_lost,
+          s.gain_set,
+          s.text};
 }
 
 }  // namespace
 
 struct RigClient::Entities {
   explicit Entities(std::uint32_t domain)
-      : participant(domain), commands(participant), samples(participant), status(participant), events(participant), replies(participant), wait(participant) {
+      : participant(domain),
+        commands(participant),
+        samples(participant),
+        status(participant),
+        events(participant),
+        replies(participant),
+        wait(participant) {
     wait.add(samples.entity());
     wait.add(status.entity());
     wait.add(replies.entity());
@@ -65,8 +83,9 @@ RigStatus RigClient::wait_for_rig(double timeout_s) {
     // A command must not be lost because the rig's reader was not matched yet.
     if (found && entities_->commands.matched() > 0 && entities_->replies.matched() > 0) return *found;
   }
-  throw config::UserError(fmt::format("no rig answers on DDS domain {}: start trocar-rig (and trocar-plant for a simulated one), or give --domain",
-                                      entities_->participant.domain()));
+  throw config::UserError(
+      fmt::format("no rig answers on DDS domain {}: start trocar-rig (and trocar-plant for a simulated one), or give --domain",
+                  entities_->participant.domain()));
 }
 
 void RigClient::send(const Command& command, const std::string& gain_set) {
@@ -90,12 +109,13 @@ RigReply RigClient::ask(CommandKind kind, double timeout_s, const std::string& g
   std::optional<RigReply> last;
   while (steady_s() < end) {
     poll(0.02, {.reply = [&](const RigReply& r) {
-      if (r.reply.session == session_ && r.reply.id == command.id && r.reply.code != ReplyCode::Accepted) last = r;
-    }});
+           if (r.reply.session == session_ && r.reply.id == command.id && r.reply.code != ReplyCode::Accepted) last = r;
+         }});
     if (last) return *last;
     keep_alive();
   }
-  throw config::UserError(fmt::format("the rig did not answer {} within {:g} s: is trocar-rig running, and is the machine overloaded?", to_string(kind), timeout_s));
+  throw config::UserError(fmt::format("the rig did not answer {} within {:g} s: is trocar-rig running, and is the machine overloaded?",
+                                      to_string(kind), timeout_s));
 }
 
 void RigClient::poll(double timeout_s, const Handlers& handlers) {

@@ -1,6 +1,6 @@
 // trocar-bench: a whole experiment in lock-step, without real time. Leaves samples.csv, capture.mcap and run.toml.
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <atomic>
 #include <chrono>
@@ -56,7 +56,9 @@ int run(const Options& options) {
 
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
-  if (error) throw config::UserError(fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
+  if (error)
+    throw config::UserError(
+        fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
   capture::RigCaptureWriter capture(options.out / "capture.mcap");
   capture::SamplesCsv csv(options.out / "samples.csv");
 
@@ -70,7 +72,8 @@ int run(const Options& options) {
   };
   while (!sequencer.finished() && !stop_asked.load()) {
     if (auto command = sequencer.next()) {
-      capture.write(wire::to_wire(*command, rig.gain_set[command->gain_set].name.data(), bench.now_ns(), 0), static_cast<std::uint64_t>(bench.now_ns()));
+      capture.write(wire::to_wire(*command, rig.gain_set[command->gain_set].name.data(), bench.now_ns(), 0),
+                    static_cast<std::uint64_t>(bench.now_ns()));
       bench.mail().commands.push(*command);
     }
     if (bench.now_ns() >= next_keep_alive_ns) {
@@ -115,7 +118,8 @@ int run(const Options& options) {
   result.phases = sequencer.phases();
   result.notes = sequencer.notes();
   experiment::write_run(options.out, result);
-  fmt::print("{:.1f} s simulated in {:.1f} s ({:.1f} times real time)\n", result.simulated_s, result.wall_s, result.simulated_s / result.wall_s);
+  fmt::print("{:.1f} s simulated in {:.1f} s ({:.1f} times real time)\n", result.simulated_s, result.wall_s,
+             result.simulated_s / result.wall_s);
   if (result.completed) return 0;
   fmt::print(stderr, "trocar-bench: {}\n", result.outcome);
   return 1;
@@ -125,9 +129,13 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"trocar-bench: controller and simulated plant in lock-step on a virtual clock.\nExample: trocar-bench --experiment insertion --out runs/bench"};
+  CLI::App app{
+      "trocar-bench: controller and simulated plant in lock-step on a virtual clock.\nExample: trocar-bench --experiment insertion --out "
+      "runs/bench"};
   app.add_option("--experiment", options.experiment, "experiment name, or path of its TOML file")->capture_default_str();
-  app.add_option("--speeds", options.speeds_mm_s, "insertion speeds in mm/s instead of the file's, such as 1,9")->delimiter(',')->check(CLI::Range(0.01, 200.0));
+  app.add_option("--speeds", options.speeds_mm_s, "insertion speeds in mm/s instead of the file's, such as 1,9")
+      ->delimiter(',')
+      ->check(CLI::Range(0.01, 200.0));
   app.add_option("--out", options.out, "folder for the results")->required();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
   app.add_flag("--progress", options.progress, "progress for a parent program, on stderr");

@@ -1,7 +1,7 @@
 // trocar-plant: the simulated machine behind the real wire. A controller cannot tell it from hardware.
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -92,8 +92,8 @@ int run(const Options& options) {
     }
   }
   const auto& p = plant->physics();
-  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times; phantom: {} steps, {} unconverged\n", 1e-9 * static_cast<double>(p.time_ns()), starved,
-             p.phantom().counters().steps, p.phantom().counters().unconverged);
+  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times; phantom: {} steps, {} unconverged\n",
+             1e-9 * static_cast<double>(p.time_ns()), starved, p.phantom().counters().steps, p.phantom().counters().unconverged);
   return 0;
 }
 
@@ -107,7 +107,8 @@ int main(int argc, char** argv) {
   app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
   app.add_option("--plant", options.plant, "plant name (how the machine differs from its rig file), or path")->capture_default_str();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
-  app.add_flag("--log-drives", options.log_drives, "print every change of a drive's state, with the plant's time, torque and the controller's silence");
+  app.add_flag("--log-drives", options.log_drives,
+               "print every change of a drive's state, with the plant's time, torque and the controller's silence");
   app.add_flag("--die-with-parent", die_with_parent, "stop when the process that started this one ends");
   try {
     app.parse(argc, argv);

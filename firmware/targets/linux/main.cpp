@@ -1,8 +1,8 @@
 // trocar-rig: the controller process on the rig controller PC. Start-up may allocate and fail; then the loop below runs the tick
 // once a period until it is told to stop.
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <CLI/CLI.hpp>
 
 #include <array>
 #include <atomic>
