@@ -24,7 +24,7 @@ constexpr const char* loopback_configuration = R"(
   <Discovery>
     <ParticipantIndex>auto</ParticipantIndex>
     <MaxAutoParticipantIndex>31</MaxAutoParticipantIndex>
-    <Peers><Peer address="localhost"/></Peers>
+    <Peers><Peer address="127.0.0.1"/></Peers>
   </Discovery>
   <Internal><SocketReceiveBufferSize min="default" max="16MB"/></Internal>
 )";
