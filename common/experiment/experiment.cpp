@@ -152,6 +152,8 @@ void Sequencer::on_reply(const Reply& reply) {
         advance();
         return;
       }
+      // The reply may overtake the sample that names the fault: let that one tell.
+      if (reply.mode == Mode::Fault && last_.mode != Mode::Fault) return;
       fail(fmt::format("{}: the rig stopped the motion (mode {}, fault {})", s.phase.name, trocar::to_string(reply.mode),
                        trocar::to_string(last_.fault)));
       return;
