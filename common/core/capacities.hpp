@@ -14,5 +14,11 @@ inline constexpr std::size_t command_ring = 64;       // host commands waiting f
 inline constexpr std::size_t event_ring = 256;        // events and replies waiting for the bridge
 inline constexpr std::size_t flight_recorder = 1000;  // samples kept for the moment of a fault
 inline constexpr std::size_t can_queue = 256;         // frames waiting in one bus direction
+inline constexpr std::size_t contacts = 64;           // contact points between needle and tissue; 2 unknowns each
+inline constexpr std::size_t embedding_nodes = 32;    // nodes that one contact is tied to
+inline constexpr std::size_t velocity_law_rows = 16;  // points of a force density over speed
+inline constexpr std::size_t cells_per_bucket = 64;   // candidate cells that one search looks at
+inline constexpr std::size_t ring_cells = 12;         // cells around a node that mesh adaptation may move
+inline constexpr std::size_t adapted_nodes = 64;      // nodes moved by mesh adaptation
 
 }  // namespace trocar::capacity

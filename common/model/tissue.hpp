@@ -1,0 +1,62 @@
+// The tissue as the tick sees it: a planar candidate mesh in the needle's plane and the compliance between its nodes.
+//   u_c = A_cc f_c   displacement [m] of candidate degrees of freedom per force [N] on them; index 2 * node + (0 for x, 1 for y)
+// 2-D scenes: candidates are the mesh's own nodes. Solids: a quad grid in the plane, each node tied to the solid by its shape functions,
+// spread over a ball about the needle's radius wide. So every scene costs the tick the same.
+// A view into memory that somebody else owns (a mapped image); nothing here allocates. Read by common/contact.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/element/element.hpp"
+
+namespace trocar::model {
+
+using Vector2 = std::array<double, 2>;
+
+inline constexpr std::int32_t surface = -1;  // beyond this edge there is no tissue
+inline constexpr std::int32_t limit = -2;    // beyond this edge there is tissue, but no candidates
+
+struct Cell {  // triangle or quad, counter-clockwise
+  std::array<std::uint32_t, 4> node{};
+  std::array<std::int32_t, 4> neighbour{};  // across the edge from node[k] to node[k + 1]: a cell, `surface` or `limit`
+  std::uint16_t count{};                    // 3 or 4
+  std::uint16_t material{};
+};
+
+inline constexpr std::uint8_t fixed_x = 1;
+inline constexpr std::uint8_t fixed_y = 2;
+inline constexpr std::uint8_t whole_ring = 4;  // all cells around this node are candidates: it may be moved
+
+// Uniform buckets over the candidates' bounding box; bucket (i, j) holds cells [begin[b], begin[b + 1]) of `cell`, b = j * count[0] + i,
+// which are all that overlap it.
+struct Buckets {
+  Vector2 origin_m{};
+  Vector2 size_m{};
+  std::array<std::uint32_t, 2> count{};
+  std::span<const std::uint32_t> begin{};
+  std::span<const std::uint32_t> cell{};
+};
+
+struct Tissue {
+  element::Model model{};
+  element::Integration integration{};
+  double thickness_m{};
+  double edge_length_m{};  // typical edge of the candidate cells
+  std::span<const Vector2> node_m{};
+  std::span<const std::uint8_t> node_flags{};
+  std::span<const Cell> cell{};
+  std::span<const std::uint32_t> ring_begin{};  // nodes + 1: cells around node n are ring_cell[ring_begin[n]] …
+  std::span<const std::uint32_t> ring_cell{};
+  std::span<const element::Material> material{};
+  Buckets buckets{};
+  // Symmetric, (2 * nodes)^2, row after row; exactly one of the two is present.
+  std::span<const double> compliance64{};
+  std::span<const float> compliance32{};
+
+  [[nodiscard]] std::size_t unknowns() const noexcept { return 2 * node_m.size(); }
+};
+
+}  // namespace trocar::model
