@@ -27,9 +27,7 @@ struct Material {
   double poisson{};  // 0 <= nu < 0.5
 };
 
-[[nodiscard]] constexpr int node_count(Type type) noexcept {
-  return type == Type::Tri3 ? 3 : type == Type::Hex8 ? 8 : 4;
-}
+[[nodiscard]] constexpr int node_count(Type type) noexcept { return type == Type::Tri3 ? 3 : type == Type::Hex8 ? 8 : 4; }
 [[nodiscard]] constexpr int dimension(Type type) noexcept { return type == Type::Tri3 || type == Type::Quad4 ? 2 : 3; }
 
 using Corners = Eigen::Matrix<double, 3, 8>;      // m, one column a node; planar elements leave z at 0
