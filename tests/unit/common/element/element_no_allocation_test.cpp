@@ -56,7 +56,7 @@ TEST(ElementNoAllocation, InAnyKernel) {
         if ((dimension(type) == 3) != (model == Model::Solid)) continue;
         const Corners& corner = type == Type::Hex8 ? brick : type == Type::Tet4 ? tet : quad;
         good = good && stiffness(type, integration, corner, c, 0.011, k) == Status::Ok;
-        good = good && response(type, corner, c, 0.011, u, force, k) == Status::Ok;
+        good = good && response(type, integration, corner, c, 0.011, u, force, k) == Status::Ok;
         good = good && natural_coordinates(type, corner, {0.6, 0.3, 0.05}, natural) && inside(type, natural, 0.0);
         shape(type, natural, value, gradient);
       }

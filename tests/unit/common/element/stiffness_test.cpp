@@ -164,7 +164,7 @@ TEST_P(EachStiffness, SaysWhenTheElementIsInverted) {
     EXPECT_EQ(stiffness(c.type, c.integration, dented, e, thickness, k), Status::Inverted);
   }
   Values u = Values::Zero(), force = Values::Constant(1.0);
-  EXPECT_EQ(response(c.type, mirrored, e, thickness, u, force, k), Status::Inverted);
+  EXPECT_EQ(response(c.type, c.integration, mirrored, e, thickness, u, force, k), Status::Inverted);
   EXPECT_TRUE(force.isZero(0.0));
   EXPECT_TRUE(k.isZero(0.0));
 }
