@@ -27,13 +27,11 @@ struct Material {
   double poisson{};  // 0 <= nu < 0.5
 };
 
-[[nodiscard]] constexpr int node_count(Type type) noexcept {
-  return type == Type::Tri3 ? 3 : type == Type::Hex8 ? 8 : 4;
-}
+[[nodiscard]] constexpr int node_count(Type type) noexcept { return type == Type::Tri3 ? 3 : type == Type::Hex8 ? 8 : 4; }
 [[nodiscard]] constexpr int dimension(Type type) noexcept { return type == Type::Tri3 || type == Type::Quad4 ? 2 : 3; }
 
 using Corners = Eigen::Matrix<double, 3, 8>;      // m, one column a node; planar elements leave z at 0
-using Elasticity = Eigen::Matrix<double, 6, 6>;   // Pa; planar models use the leading 3 x 3
+using Elasticity = Eigen::Matrix<double, 6, 6>;   // Pa; planar models: xx, yy, xy in the leading 3 x 3, then zz (zero in plane stress)
 using Stiffness = Eigen::Matrix<double, 24, 24>;  // N/m; the leading (node_count * dimension) rows and columns are used
 using Values = Eigen::Matrix<double, 24, 1>;      // displacements [m] or forces [N], same order
 using Shape = Eigen::Matrix<double, 8, 1>;        // shape functions at a point
@@ -47,14 +45,16 @@ void shape(Type type, const Eigen::Vector3d& natural, Shape& value, ShapeGradien
 
 // Natural coordinates of a point; false when Newton does not converge. Points outside of the element are answered too
 // (inside() says which): Newton continues the map.
+// Planar elements ignore x_m's z and answer 0 for the third coordinate.
 [[nodiscard]] bool natural_coordinates(Type type, const Corners& corner, const Eigen::Vector3d& x_m, Eigen::Vector3d& natural) noexcept;
 [[nodiscard]] bool inside(Type type, const Eigen::Vector3d& natural, double tolerance) noexcept;
 
-// The unused rows and columns are zero.
+// k is exactly symmetric; its unused rows and columns are zero, and so is all of it when Inverted.
 [[nodiscard]] Status stiffness(Type type, Integration integration, const Corners& corner, const Elasticity& c, double thickness_m,
                                Stiffness& k) noexcept;
 
-// Green-Lagrange internal force and consistent tangent at displacement u. BBar applies to the linear stiffness alone: here it is full.
+// Green-Lagrange internal force and consistent tangent (exactly symmetric) at displacement u; zero when Inverted. BBar applies to the
+// linear stiffness alone: here it is full.
 [[nodiscard]] Status response(Type type, const Corners& corner, const Elasticity& c, double thickness_m, const Values& u, Values& force,
                               Stiffness& tangent) noexcept;
 
