@@ -38,8 +38,8 @@ const PhantomConfig& checked(const PhantomConfig& config) {
               "velocity law " + v.name + ": densities must not be negative, and the tip's at least the shaft's (row " +
                   std::to_string(i + 1) + ")");
   }
-  (void)fem::structured_grid(config.tissue.grid);
-  const int unknowns = 2 * config.tissue.grid.nodes[0] * config.tissue.grid.nodes[1];
+  const PlaneGrid grid = plane_grid(config.tissue);
+  const int unknowns = 2 * grid.nodes[0] * grid.nodes[1];
   require(unknowns <= most_unknowns, "tissue: " + std::to_string(unknowns) +
                                          " unknowns; this phantom stores the whole compliance, so at most " +
                                          std::to_string(most_unknowns) + " (50 x 50 nodes)");
@@ -47,21 +47,21 @@ const PhantomConfig& checked(const PhantomConfig& config) {
 }
 
 // Contacts closer than the mesh is fine would make their compliance nearly singular.
-double edge_length(const fem::Grid& grid) { return std::max(grid.size_m[0] / (grid.nodes[0] - 1), grid.size_m[1] / (grid.nodes[1] - 1)); }
+double edge_length(const PlaneGrid& grid) { return std::max(grid.size_m[0] / (grid.nodes[0] - 1), grid.size_m[1] / (grid.nodes[1] - 1)); }
 
 std::size_t contact_capacity(const PhantomConfig& config) {
-  const fem::Grid& grid = config.tissue.grid;
+  const PlaneGrid grid = plane_grid(config.tissue);
   const double longest = std::min(2.0 * config.needle.length_m, std::hypot(grid.size_m[0], grid.size_m[1]));
   return static_cast<std::size_t>(longest / edge_length(grid)) + 3;
 }
 
-double dot(const fem::Point& a, const fem::Point& b) { return a[0] * b[0] + a[1] * b[1]; }
-fem::Point minus(const fem::Point& a, const fem::Point& b) { return {a[0] - b[0], a[1] - b[1]}; }
-fem::Point along(const fem::Point& from, const fem::Point& direction, double distance) {
+double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1]; }
+Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1]}; }
+Point along(const Point& from, const Point& direction, double distance) {
   return {from[0] + distance * direction[0], from[1] + distance * direction[1]};
 }
-fem::Point interpolate(const fem::Embedding& at, const std::array<fem::Point, 4>& nodes) {
-  fem::Point u{};
+Point interpolate(const Embedding& at, const std::array<Point, 4>& nodes) {
+  Point u{};
   for (std::size_t p = 0; p < static_cast<std::size_t>(at.count); ++p) u = along(u, nodes[p], at.weight[p]);
   return u;
 }
@@ -73,20 +73,24 @@ Phantom::Phantom(const PhantomConfig& config)
     : config_(checked(config)),
       shaft_law_(law(config.contact, &VelocityLaw::shaft_n_per_m, config.contact.shaft_n_per_m)),
       tip_law_(law(config.contact, &VelocityLaw::tip_n_per_m, config.contact.tip_n_per_m)),
-      spacing_m_(edge_length(config.tissue.grid)),
+      grid_(plane_grid(config_.tissue)),
+      spacing_m_(edge_length(grid_)),
       problem_(contact_capacity(config)),
       place_(problem_.capacity()),
       input_(problem_.capacity()),
       row_(problem_.capacity()),
       tip_coupling_(problem_.capacity()) {
-  const fem::Mesh mesh = fem::structured_grid(config_.tissue.grid);
+  const fem::Mesh mesh = fem::make_mesh(config_.tissue);
   const fem::Statics statics(mesh, config_.tissue);
   const Eigen::Index rows = statics.degrees_of_freedom();
-  std::vector<Eigen::Index> all(static_cast<std::size_t>(rows));
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Eigen::Index>(i);
-  const Eigen::MatrixXd a = fem::compliance_columns(statics, all);
-  rows_ = all.size();
-  compliance_.assign(a.data(), a.data() + a.size());
+  rows_ = static_cast<std::size_t>(rows);
+  compliance_.resize(rows_ * rows_);
+  Eigen::SparseMatrix<double> unit_loads(rows, rows);
+  unit_loads.setIdentity();
+  statics.solve_columns(unit_loads, 64, [&](Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& u) {
+    for (Eigen::Index c = 0; c < u.cols(); ++c)
+      std::copy(u.col(c).begin(), u.col(c).end(), compliance_.begin() + static_cast<std::ptrdiff_t>((first + c) * rows));
+  });
   shaft_n_per_m_ = shaft_law_(0.0);
   tip_n_per_m_ = tip_law_(0.0);
 }
@@ -94,7 +98,7 @@ Phantom::Phantom(const PhantomConfig& config)
 double Phantom::path_m() const noexcept { return contacts() == 0 ? 0.0 : place_[contacts() - 1].path + beyond_last(); }
 
 // Displacement at a per unit force at b.
-Block Phantom::coupling(const fem::Embedding& a, const fem::Embedding& b) const noexcept {
+Block Phantom::coupling(const Embedding& a, const Embedding& b) const noexcept {
   Block block{};
   for (std::size_t p = 0; p < static_cast<std::size_t>(a.count); ++p)
     for (std::size_t q = 0; q < static_cast<std::size_t>(b.count); ++q) {
@@ -111,11 +115,11 @@ Block Phantom::coupling(const fem::Embedding& a, const fem::Embedding& b) const 
 }
 
 // Of the nodes that `at` names, by the present contact forces.
-std::array<fem::Point, 4> Phantom::node_displacements(const fem::Embedding& at) noexcept {
+std::array<Point, 4> Phantom::node_displacements(const Embedding& at) noexcept {
   if (at.element != tip_element_) tip_coupled_ = 0;
   tip_element_ = at.element;
   tip_coupled_ = std::min(tip_coupled_, contacts());
-  fem::Embedding node;
+  Embedding node;
   node.count = 1;
   node.weight[0] = 1.0;
   for (; tip_coupled_ < contacts(); ++tip_coupled_)
@@ -123,7 +127,7 @@ std::array<fem::Point, 4> Phantom::node_displacements(const fem::Embedding& at) 
       node.node[0] = at.node[p];
       tip_coupling_[tip_coupled_][p] = coupling(node, place_[tip_coupled_].embedding);
     }
-  std::array<fem::Point, 4> u{};
+  std::array<Point, 4> u{};
   for (std::size_t j = 0; j < contacts(); ++j) {
     const ContactForce& f = problem_.contact(j);
     const double fx = axis_[0] * f.axial_n - axis_[1] * f.lateral_n;
@@ -138,8 +142,8 @@ std::array<fem::Point, 4> Phantom::node_displacements(const fem::Embedding& at) 
 }
 
 // From a point in the tissue to its boundary; 0 from outside.
-double Phantom::exit_distance(const fem::Point& from, const fem::Point& direction) const noexcept {
-  const fem::Grid& grid = config_.tissue.grid;
+double Phantom::exit_distance(const Point& from, const Point& direction) const noexcept {
+  const PlaneGrid& grid = grid_;
   double distance = std::numeric_limits<double>::max();
   for (std::size_t axis = 0; axis < 2; ++axis) {
     if (direction[axis] == 0.0) continue;
@@ -154,10 +158,10 @@ double Phantom::beyond_last() const noexcept {
   return std::clamp(tip_beyond_m_, 0.0, exit_distance(last.material, last.direction));
 }
 
-void Phantom::add_contact(const fem::Point& material, const fem::Point& direction, double path) noexcept {
+void Phantom::add_contact(const Point& material, const Point& direction, double path) noexcept {
   const std::size_t i = contacts();
-  const fem::Embedding embedding = fem::locate(config_.tissue.grid, material);
-  const fem::Point u = interpolate(embedding, node_displacements(embedding));
+  const Embedding embedding = locate(grid_, material);
+  const Point u = interpolate(embedding, node_displacements(embedding));
   place_[i] = {material, direction, path, dot(axis_, minus({material[0] + u[0], material[1] + u[1]}, base_)), embedding};
   for (std::size_t j = 0; j <= i; ++j) row_[j] = coupling(embedding, place_[j].embedding);
   problem_.push({row_.data(), i + 1});
@@ -165,7 +169,7 @@ void Phantom::add_contact(const fem::Point& material, const fem::Point& directio
 
 // The tip is in the tissue and nothing holds it yet: the path begins where the shaft crosses the boundary.
 void Phantom::enter() noexcept {
-  const fem::Point tip = along(base_, axis_, config_.needle.length_m);
+  const Point tip = along(base_, axis_, config_.needle.length_m);
   const double depth = std::min(exit_distance(tip, {-axis_[0], -axis_[1]}), config_.needle.length_m);
   tip_material_ = tip;
   tip_beyond_m_ = depth;
@@ -182,7 +186,7 @@ void Phantom::solve_contacts() noexcept {
     const Place& p = place_[i];
     const double ends = i + 1 < n ? place_[i + 1].path : tip_path;
     const double threshold = shaft_n_per_m_ * (ends - p.path);
-    const fem::Point from_base = minus(p.material, base_);
+    const Point from_base = minus(p.material, base_);
     input_[i] = {p.arclength - dot(axis_, from_base), axis_[1] * from_base[0] - axis_[0] * from_base[1], 0.0, -threshold,
                  threshold + excess * overlap(p.path, ends, zone_begins, tip_path)};
   }
@@ -201,14 +205,14 @@ void Phantom::solve_contacts() noexcept {
 void Phantom::find_tip() noexcept {
   constexpr int most_iterations = 30;
   constexpr double tolerance_m = 1e-12;
-  const fem::Point tip = along(base_, axis_, config_.needle.length_m);
-  std::array<fem::Point, 4> nodes{};
+  const Point tip = along(base_, axis_, config_.needle.length_m);
+  std::array<Point, 4> nodes{};
   int element = -1;
   for (int k = 0; k < most_iterations; ++k) {
-    const fem::Embedding at = fem::locate(config_.tissue.grid, tip_material_);
+    const Embedding at = locate(grid_, tip_material_);
     if (at.element != element) nodes = node_displacements(at);
     element = at.element;
-    const fem::Point rest = minus(minus(tip, tip_material_), interpolate(at, nodes));
+    const Point rest = minus(minus(tip, tip_material_), interpolate(at, nodes));
     if (std::abs(rest[0]) + std::abs(rest[1]) < tolerance_m) return;
     Block j{1.0, 0.0, 0.0, 1.0};
     for (std::size_t p = 0; p < static_cast<std::size_t>(at.count); ++p)
@@ -217,8 +221,8 @@ void Phantom::find_tip() noexcept {
     const double determinant = j[0] * j[3] - j[1] * j[2];
     // Tissue that linear elasticity has turned inside out has no meaningful gradient.
     const bool usable = determinant > 0.05;
-    const fem::Point step =
-        usable ? fem::Point{(j[3] * rest[0] - j[1] * rest[1]) / determinant, (j[0] * rest[1] - j[2] * rest[0]) / determinant} : rest;
+    const Point step =
+        usable ? Point{(j[3] * rest[0] - j[1] * rest[1]) / determinant, (j[0] * rest[1] - j[2] * rest[0]) / determinant} : rest;
     const double length = std::hypot(step[0], step[1]);
     tip_material_ = along(tip_material_, step, length > spacing_m_ ? spacing_m_ / length : 1.0);
   }
@@ -239,9 +243,9 @@ void Phantom::follow_tip() noexcept {
       break;
     }
     const Place& last = place_[contacts() - 1];
-    const fem::Point next = along(last.material, minus(tip_material_, last.material), spacing_m_ / tip_beyond_m_);
-    if (!fem::inside(config_.tissue.grid, next)) break;
-    const fem::Point step = minus(next, last.material);
+    const Point next = along(last.material, minus(tip_material_, last.material), spacing_m_ / tip_beyond_m_);
+    if (!inside(grid_, next)) break;
+    const Point step = minus(next, last.material);
     const double length = std::hypot(step[0], step[1]);
     add_contact(next, {step[0] / length, step[1] / length}, last.path + spacing_m_);
     measure();
@@ -263,7 +267,7 @@ Phantom::Vector3 Phantom::advance(const Vector3& base_pose, double dt_s) noexcep
     ++counters_.refused;
     return wrench_;
   }
-  const fem::Point base{base_pose[0], base_pose[1]};
+  const Point base{base_pose[0], base_pose[1]};
   axis_ = {std::cos(base_pose[2]), std::sin(base_pose[2])};
   if (started_) {
     const double speed = dot(axis_, minus(base, base_)) / dt_s;
@@ -275,11 +279,11 @@ Phantom::Vector3 Phantom::advance(const Vector3& base_pose, double dt_s) noexcep
   base_ = base;
 
   if (contacts() == 0) {
-    const fem::Point tip = along(base_, axis_, config_.needle.length_m);
+    const Point tip = along(base_, axis_, config_.needle.length_m);
     tip_material_ = tip;
     wrench_ = {};
     residual_n_ = 0.0;
-    if (!fem::inside(config_.tissue.grid, tip)) return wrench_;
+    if (!inside(grid_, tip)) return wrench_;
     enter();
   }
   solve_contacts();

@@ -22,10 +22,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/fem/mesh.hpp"
 #include "sim_plant/phantom/config.hpp"
 #include "sim_plant/phantom/contact_problem.hpp"
 #include "sim_plant/phantom/monotone_cubic.hpp"
+#include "sim_plant/phantom/plane_grid.hpp"
 
 namespace trocar::sim_plant {
 
@@ -43,11 +43,11 @@ class Phantom {
   [[nodiscard]] const Vector3& base_wrench() const noexcept { return wrench_; }
   [[nodiscard]] double path_m() const noexcept;                           // path in the tissue, entry to tip, reference mesh
   [[nodiscard]] double speed_m_s() const noexcept { return speed_m_s_; }  // along the shaft, filtered
-  [[nodiscard]] fem::Point tip_material_m() const noexcept { return tip_material_; }
+  [[nodiscard]] Point tip_material_m() const noexcept { return tip_material_; }
   [[nodiscard]] double shaft_density_n_per_m() const noexcept { return shaft_n_per_m_; }
 
   struct Contact {
-    fem::Point material_m{};
+    Point material_m{};
     double arclength_m{};  // on the needle, from the base
     ContactForce force{};  // of the needle on the tissue
   };
@@ -67,18 +67,18 @@ class Phantom {
 
  private:
   struct Place {
-    fem::Point material{};
-    fem::Point direction{};  // of the path where it reaches this contact, reference mesh
-    double path{};           // length of the path up to here
+    Point material{};
+    Point direction{};  // of the path where it reaches this contact, reference mesh
+    double path{};      // length of the path up to here
     double arclength{};
-    fem::Embedding embedding{};
+    Embedding embedding{};
   };
 
-  [[nodiscard]] Block coupling(const fem::Embedding& a, const fem::Embedding& b) const noexcept;
-  [[nodiscard]] std::array<fem::Point, 4> node_displacements(const fem::Embedding& at) noexcept;
-  [[nodiscard]] double exit_distance(const fem::Point& from, const fem::Point& direction) const noexcept;
+  [[nodiscard]] Block coupling(const Embedding& a, const Embedding& b) const noexcept;
+  [[nodiscard]] std::array<Point, 4> node_displacements(const Embedding& at) noexcept;
+  [[nodiscard]] double exit_distance(const Point& from, const Point& direction) const noexcept;
   [[nodiscard]] double beyond_last() const noexcept;  // path from the last contact to the tip, inside of the tissue
-  void add_contact(const fem::Point& material, const fem::Point& direction, double path) noexcept;
+  void add_contact(const Point& material, const Point& direction, double path) noexcept;
   void enter() noexcept;
   void solve_contacts() noexcept;
   void find_tip() noexcept;
@@ -86,6 +86,7 @@ class Phantom {
 
   PhantomConfig config_;
   MonotoneCubic shaft_law_, tip_law_;
+  PlaneGrid grid_;
   double spacing_m_;
   std::size_t rows_{};
   std::vector<double> compliance_;  // A, rows_ x rows_
@@ -100,8 +101,8 @@ class Phantom {
   std::size_t tip_coupled_{};
 
   bool started_{false};
-  fem::Point base_{}, axis_{};
-  fem::Point tip_material_{};
+  Point base_{}, axis_{};
+  Point tip_material_{};
   double tip_beyond_m_{};  // along the last contact's direction
   double deepest_m_{};     // longest path cut since the last complete withdrawal
   double speed_m_s_{}, shaft_n_per_m_{}, tip_n_per_m_{};

@@ -5,27 +5,32 @@
 #include <string>
 
 #include "common/config/document.hpp"
+#include "common/fem/mesh.hpp"
 
 namespace trocar::sim_plant {
 namespace {
 
-std::optional<fem::Box> box_of(const std::optional<config::SceneBox>& box) {
-  if (!box) return std::nullopt;
-  return fem::Box{box->min_m, box->max_m};
+fem::Box box_of(const config::SceneBox& box) {
+  fem::Box out;
+  for (std::size_t a = 0; a < 2; ++a) {
+    out.min_m[a] = box.min_m[a];
+    out.max_m[a] = box.max_m[a];
+  }
+  return out;
 }
 
-fem::Edge edge_of(config::GridEdge edge) {
+fem::Side side_of(config::GridEdge edge) {
   switch (edge) {
     case config::GridEdge::XMin:
-      return fem::Edge::XMin;
+      return fem::Side::XMin;
     case config::GridEdge::XMax:
-      return fem::Edge::XMax;
+      return fem::Side::XMax;
     case config::GridEdge::YMin:
-      return fem::Edge::YMin;
+      return fem::Side::YMin;
     case config::GridEdge::YMax:
       break;
   }
-  return fem::Edge::YMax;
+  return fem::Side::YMax;
 }
 
 }  // namespace
@@ -74,11 +79,15 @@ PhantomConfig phantom_config(const config::SceneFile& scene) {
   phantom.tissue.model = scene.tissue.model == config::TissueModel::PlaneStress ? fem::Model::PlaneStress : fem::Model::PlaneStrain;
   phantom.tissue.thickness_m = scene.tissue.thickness_m;
   const config::SceneGrid& grid = scene.tissue.grid;
-  phantom.tissue.grid = {grid.size_m, grid.origin_m, grid.nodes,
-                         grid.element == config::GridElement::Quad4 ? fem::Element::Quad4 : fem::Element::Tri3};
-  for (const config::SceneMaterial& m : scene.tissue.materials) phantom.tissue.materials.push_back({m.young_pa, m.poisson, box_of(m.box)});
+  phantom.tissue.grid = fem::uniform_grid(grid.element == config::GridElement::Quad4 ? fem::Type::Quad4 : fem::Type::Tri3,
+                                          {grid.origin_m[0], grid.origin_m[1], 0.0}, {grid.size_m[0], grid.size_m[1], 0.0},
+                                          {grid.nodes[0], grid.nodes[1], 1});
+  for (const config::SceneMaterial& m : scene.tissue.materials) {
+    fem::Zone& zone = phantom.tissue.zones.emplace_back(fem::Zone{{m.young_pa, m.poisson}, {}, {}});
+    if (m.box) zone.box = box_of(*m.box);
+  }
   for (const config::SceneSupport& s : scene.tissue.supports)
-    phantom.tissue.supports.push_back({edge_of(s.edge), box_of(s.box), s.fix_x, s.fix_y});
+    phantom.tissue.supports.push_back({s.box ? fem::Where(box_of(*s.box)) : fem::Where(side_of(s.edge)), {s.fix_x, s.fix_y, false}});
   phantom.needle.length_m = scene.needle.length_m;
   phantom.contact = {scene.contact.shaft_n_per_m, scene.contact.tip_n_per_m, scene.contact.tip_zone_m, std::nullopt};
   if (const auto& law = scene.contact.velocity_law)

@@ -23,7 +23,7 @@ void PlantMillisecond(benchmark::State& run) {
   rig::Rig rig = config::read_rig(shared("rigs/ubc_twin.toml"));
   const PhantomConfig phantom = scene();
   if (run.range(0) > 0)
-    rig.homing_pose[1] = phantom.tissue.grid.origin_m[1] - phantom.needle.length_m + 1e-3 * static_cast<double>(run.range(0));
+    rig.homing_pose[1] = phantom.tissue.grid->axis_m[1].front() - phantom.needle.length_m + 1e-3 * static_cast<double>(run.range(0));
   Plant plant(rig, read_plant(shared("plants/ubc_twin.toml")), phantom, 1);
   const double home = rig.homing_pose[1];
   for (auto _ : run) {

@@ -10,16 +10,16 @@ namespace trocar::sim_plant {
 namespace {
 
 TEST(PhantomBalance, ContactForcesPutTheWholeMeshOntoTheNeedle) {
-  for (const fem::Element element : {fem::Element::Quad4, fem::Element::Tri3}) {
+  for (const fem::Type element : {fem::Type::Quad4, fem::Type::Tri3}) {
     PhantomConfig config = scene();
-    config.tissue.grid.element = element;
+    config.tissue.grid = square(21, element);
     Hand hand(config);
     hand.move(-0.004, 0.06, 0.06);
     hand.move(0.002, -0.004, -0.03);
     const Phantom& phantom = hand.phantom;
     ASSERT_GT(phantom.contacts(), 5u);
 
-    const fem::Statics statics(fem::structured_grid(config.tissue.grid), config.tissue);
+    const fem::Statics statics(fem::make_mesh(config.tissue), config.tissue);
     Eigen::VectorXd load = Eigen::VectorXd::Zero(statics.degrees_of_freedom());
     const double c = std::cos(hand.pose[2]);
     const double s = std::sin(hand.pose[2]);
@@ -28,13 +28,13 @@ TEST(PhantomBalance, ContactForcesPutTheWholeMeshOntoTheNeedle) {
     };
     for (std::size_t i = 0; i < phantom.contacts(); ++i) {
       const Phantom::Contact contact = phantom.contact(i);
-      const fem::Embedding at = fem::locate(config.tissue.grid, contact.material_m);
+      const Embedding at = locate(plane_grid(config.tissue), contact.material_m);
       for (std::size_t k = 0; k < static_cast<std::size_t>(at.count); ++k)
         load.segment<2>(2 * at.node[k]) += at.weight[k] * force(contact.force);
     }
     const Eigen::VectorXd u = statics.solve(load);
-    const auto deformed = [&](const fem::Point& material) {
-      const fem::Embedding at = fem::locate(config.tissue.grid, material);
+    const auto deformed = [&](const Point& material) {
+      const Embedding at = locate(plane_grid(config.tissue), material);
       Eigen::Vector2d x(material[0], material[1]);
       for (std::size_t k = 0; k < static_cast<std::size_t>(at.count); ++k) x += at.weight[k] * u.segment<2>(2 * at.node[k]);
       return x;
@@ -68,7 +68,7 @@ TEST(PhantomBalance, StuckStiffnessSettlesUnderRefinement) {
   std::vector<double> stiffness;
   for (const int nodes : {11, 21, 31}) {
     PhantomConfig config = scene();
-    config.tissue.grid.nodes = {nodes, nodes};
+    config.tissue.grid = square(nodes);
     config.contact = {1e-6, 1e-6, 0.0, {}};
     Hand hand(config);
     hand.move(0.0, 0.005 + 0.0499, 0.0, 1e-3);

@@ -322,7 +322,7 @@ TEST(Phantom, NamesWhatIsWrongWithAScene) {
   bad.contact.velocity_law->tip_n_per_m.pop_back();
   EXPECT_NE(refusal(bad).find("pvc"), std::string::npos);
   bad = scene();
-  bad.tissue.grid.nodes = {200, 200};
+  bad.tissue.grid = square(200);
   EXPECT_NE(refusal(bad).find("unknowns"), std::string::npos);
   bad = scene();
   bad.tissue.supports.clear();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/fem/mesh.hpp"
 #include "sim_plant/phantom/phantom.hpp"
 
 namespace trocar::sim_plant {
@@ -13,12 +14,16 @@ inline constexpr double needle_m = 0.1;
 inline constexpr double shaft_n_per_m = 34.0;
 inline constexpr double tip_excess_n = (68.0 - 34.0) * 0.0025;
 
+inline fem::Grid square(int nodes, fem::Type element = fem::Type::Quad4) {
+  return fem::uniform_grid(element, {-0.05, face_m, 0.0}, {0.1, 0.1, 0.0}, {nodes, nodes, 1});
+}
+
 inline PhantomConfig scene() {
   PhantomConfig config;
   config.tissue.thickness_m = 0.011;
-  config.tissue.grid = {{0.1, 0.1}, {-0.05, face_m}, {21, 21}, fem::Element::Quad4};
-  config.tissue.materials = {{25300.0, 0.48, {}}};
-  config.tissue.supports = {{fem::Edge::YMax, {}, true, true}};
+  config.tissue.grid = square(21);
+  config.tissue.zones = {{{25300.0, 0.48}, {}, {}}};
+  config.tissue.supports = {{fem::Side::YMax, {true, true, false}}};
   config.needle.length_m = needle_m;
   config.contact = {shaft_n_per_m, 68.0, 0.0025, {}};
   return config;

@@ -60,14 +60,14 @@ TEST(PlantFile, NamesKeyAndRemedyOfAMistake) {
 TEST(PlantFile, TakesTheShippedSceneAsItIs) {
   const PhantomConfig phantom = shipped_phantom();
   EXPECT_EQ(phantom.tissue.model, fem::Model::PlaneStress);
-  EXPECT_EQ(phantom.tissue.grid.element, fem::Element::Quad4);
-  EXPECT_EQ(phantom.tissue.grid.origin_m[1], 0.215);
+  EXPECT_EQ(phantom.tissue.grid->element, fem::Type::Quad4);
+  EXPECT_EQ(phantom.tissue.grid->axis_m[1].front(), 0.215);
   EXPECT_EQ(phantom.tissue.thickness_m, 0.011);
-  ASSERT_EQ(phantom.tissue.materials.size(), 1u);
-  EXPECT_EQ(phantom.tissue.materials[0].young_pa, 25300.0);
+  ASSERT_EQ(phantom.tissue.zones.size(), 1u);
+  EXPECT_EQ(phantom.tissue.zones[0].material.young_pa, 25300.0);
   ASSERT_EQ(phantom.tissue.supports.size(), 1u);
-  EXPECT_EQ(phantom.tissue.supports[0].edge, fem::Edge::YMax);
-  EXPECT_TRUE(phantom.tissue.supports[0].fix_x && phantom.tissue.supports[0].fix_y);
+  EXPECT_EQ(phantom.tissue.supports[0].where, fem::Where(fem::Side::YMax));
+  EXPECT_EQ(phantom.tissue.supports[0].fix, (std::array{true, true, false}));
   EXPECT_EQ(phantom.needle.length_m, 0.10);
   EXPECT_EQ(phantom.contact.tip_zone_m, 0.0025);
   ASSERT_TRUE(phantom.contact.velocity_law.has_value());
@@ -84,7 +84,7 @@ TEST(PlantFile, TakesTheShippedSceneAsItIs) {
 TEST(PlantFile, SceneFitsTheRig) {
   const rig::Rig rig = shipped_rig();
   const PhantomConfig phantom = shipped_phantom();
-  const double at_contact = phantom.tissue.grid.origin_m[1] - phantom.needle.length_m;
+  const double at_contact = phantom.tissue.grid->axis_m[1].front() - phantom.needle.length_m;
   EXPECT_GT(at_contact, rig.homing_pose[1] + 0.002);
   EXPECT_LT(at_contact + 0.070 + 0.010, rig.limits.workspace_y_m[1]);
 }
