@@ -83,8 +83,18 @@ Vector2 WorkingSet::displacement_m(const Embedding& at) noexcept {
   return u;
 }
 
+Vector2 WorkingSet::tied_displacement_m(std::size_t contact) noexcept {
+  Vector2 u{};
+  for (std::size_t j = 0; j < size(); ++j) {
+    const Block g = solver_.compliance(contact, j);
+    const Vector2& f = solver_.contact(j).force_n;
+    u = {u[0] + g[0] * f[0] + g[1] * f[1], u[1] + g[2] * f[0] + g[3] * f[1]};
+  }
+  return u;
+}
+
 // row_[0 … before]: the couplings of `at` with the contacts before it, and its own block.
-std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before, double softening) noexcept {
+std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexcept {
   std::fill_n(row_.begin(), before, Block{});
   for (std::uint32_t k = 0; k < at.count; ++k) {
     const NodeCoupling& entry = coupling_of(at.node[k]);
@@ -95,16 +105,16 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before, double
   Block own = compliance_.coupling(at, at);
   own[1] = own[2] = 0.5 * (own[1] + own[2]);
   const double mean = 0.5 * (own[0] + own[3]);
-  const double added = std::max((regularisation_ + softening) * mean, mean < least_compliance_ ? least_compliance_ : 0.0);
+  const double added = std::max(regularisation_ * mean, mean < least_compliance_ ? least_compliance_ : 0.0);
   own[0] += added;
   own[3] += added;
-  row_[before] = own;
+  row_[before] = last_own_ = own;
   return before + 1;
 }
 
-void WorkingSet::push(const Point& point, double softening) noexcept {
+void WorkingSet::push(const Point& point) noexcept {
   const std::size_t i = size();
-  const std::size_t count = make_row(point.at, i, softening);
+  const std::size_t count = make_row(point.at, i);
   point_[i] = point;
   point_[i].material_m = geometry_.mean_m(point.at);
   solver_.push({row_.data(), count});
@@ -113,6 +123,18 @@ void WorkingSet::push(const Point& point, double softening) noexcept {
 void WorkingSet::pop() noexcept {
   solver_.pop();
   forget_couplings(size());
+  // What is the last one now was a whole segment: its tie is not softened.
+  if (size() > 0) last_own_ = solver_.compliance(size() - 1, size() - 1);
+}
+
+void WorkingSet::soften_last(const Vector2& tangent) noexcept {
+  if (law_->method != Method::Embedded || law_->explicit_count > 0) return;
+  const std::size_t i = size() - 1;
+  const double softness = 0.5 * (last_own_[0] + last_own_[3]) * (law_->spacing_m / point_[i].length_m - 1.0);
+  const Vector2 n{-tangent[1], tangent[0]};
+  const Block own{last_own_[0] + softness * n[0] * n[0], last_own_[1] + softness * n[0] * n[1], last_own_[2] + softness * n[0] * n[1],
+                  last_own_[3] + softness * n[1] * n[1]};
+  solver_.replace_own(i, own);
 }
 
 bool WorkingSet::place(const Vector2& x_m) noexcept {
@@ -121,7 +143,7 @@ bool WorkingSet::place(const Vector2& x_m) noexcept {
   Point point;
   point.at = geometry_.point(cell, x_m);
   point.begin_m = x_m;
-  push(point, 0.0);
+  push(point);
   point_[size() - 1].material_m = x_m;
   solver_.start_from(size() - 1, State::Stuck);
   return true;
@@ -188,7 +210,7 @@ void WorkingSet::resize_last(double length_m) noexcept {
   last.length_m = now;
   last.fresh = true;
   forget_couplings(i);
-  solver_.replace_last({row_.data(), make_row(last.at, i, spacing / now - 1.0)});
+  solver_.replace(i, {row_.data(), make_row(last.at, i)});
 }
 
 void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept {
@@ -199,7 +221,7 @@ void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, 
   point.path_m = path_m;
   point.length_m = resize_step * spacing / 2;
   point.at = geometry_.segment(begin_m, plus(begin_m, scaled(direction, point.length_m)), tip_cell_);
-  push(point, spacing / point.length_m - 1.0);
+  push(point);
 }
 
 void WorkingSet::push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction,
@@ -238,7 +260,7 @@ void WorkingSet::push_node(const Vector2& crossing_m, const model::Cell& cell, s
   point.path_m = size() == 0 ? 0.0
                              : point_[size() - 1].path_m +
                                    std::max(0.0, dot(point_[size() - 1].direction, minus(crossing_m, point_[size() - 1].begin_m)));
-  push(point, 0.0);
+  push(point);
 }
 
 // From one point of the path to a later one, with a contact at each edge that it crosses.

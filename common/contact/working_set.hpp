@@ -74,6 +74,9 @@ class WorkingSet {
   void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept;
 
   [[nodiscard]] bool in_tissue(const Vector2& x_m) const noexcept { return geometry_.locate(x_m, -1) >= 0; }
+  // Turns the soft tie of the last segment into the frame of this tick. Before every solve.
+  void soften_last(const Vector2& tangent) noexcept;
+
   // First contact of a needle whose tip stands in undeformed tissue; the path begins where its straight shaft crosses the surface, at most
   // `most_m` behind the tip.
   Trouble enter(const Vector2& tip_m, const Vector2& direction, double most_m) noexcept;
@@ -82,6 +85,8 @@ class WorkingSet {
 
   // Displacement that the present forces cause, m. O(s) for points that are tied to nodes in use.
   [[nodiscard]] Vector2 displacement_m(const Embedding& at) noexcept;
+  // Of a contact as its solve sees it: with the softness and the regularisation of its tie.
+  [[nodiscard]] Vector2 tied_displacement_m(std::size_t contact) noexcept;
 
  private:
   struct NodeCoupling {  // displacement of a node per unit force at each contact
@@ -95,8 +100,8 @@ class WorkingSet {
   const NodeCoupling& coupling_of(std::uint32_t node) noexcept;
   void forget_couplings(std::size_t from_contact) noexcept;
   [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
-  std::size_t make_row(const Embedding& at, std::size_t before, double softening) noexcept;
-  void push(const Point& point, double softening) noexcept;
+  std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
+  void push(const Point& point) noexcept;
   void pop() noexcept;
   void resize_last(double length_m) noexcept;
   void push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept;
@@ -118,6 +123,7 @@ class WorkingSet {
   Solver solver_{};
   std::array<Point, capacity::contacts> point_{};
   std::array<Block, capacity::contacts> row_{};
+  Block last_own_{};  // of the last contact, without the softness of its tie
   std::array<NodeCoupling, nodes_in_use> coupling_{};
   std::size_t coupling_count_{0};
   std::uint64_t clock_{0};
