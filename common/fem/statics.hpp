@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/fem/assembly.hpp"
 #include "common/fem/factor.hpp"
 #include "common/fem/mesh.hpp"
 
@@ -32,7 +33,7 @@ class Statics {
   Statics(const Mesh& mesh, const Tissue& tissue);
 
   [[nodiscard]] Eigen::Index degrees_of_freedom() const { return stiffness_.rows(); }
-  [[nodiscard]] bool supported(Eigen::Index degree_of_freedom) const { return equation_[static_cast<std::size_t>(degree_of_freedom)] < 0; }
+  [[nodiscard]] bool supported(Eigen::Index degree_of_freedom) const { return equations_.supported(degree_of_freedom); }
   [[nodiscard]] const Eigen::SparseMatrix<double>& stiffness_n_per_m() const { return stiffness_; }  // before supports
   [[nodiscard]] Factor::Info factor_info() const { return factor_ ? factor_->info() : Factor::Info{}; }
 
@@ -44,9 +45,8 @@ class Statics {
   void solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::Index block, const Sink& sink) const;
 
  private:
+  Equations equations_;
   Eigen::SparseMatrix<double> stiffness_{};
-  std::vector<int> equation_{};  // row in the factored system, -1 where supported
-  int equations_{};
   std::unique_ptr<Factor> factor_{};
 };
 
