@@ -28,7 +28,6 @@ struct Needle {
 // What a scene takes of common/core/capacities.hpp.
 struct Need {
   std::uint32_t contacts{};         // a needle that is all in tissue, or the explicit ones
-  std::uint32_t embedding_nodes{};  // bound on the nodes that one contact is tied to
   std::uint32_t cells_per_bucket{};
   std::uint32_t ring_cells{};  // around a node that may be moved
 };
@@ -46,6 +45,7 @@ struct Image {
   Needle needle{};
   Need need{};
   Float32Error float32_error{};
+  std::uint32_t checksum{};  // filled by open(): names this image to the file that draws it
 };
 
 enum class ImageStatus : std::uint8_t {

@@ -59,6 +59,7 @@ struct Parameters {
   std::array<std::uint32_t, 2> bucket_count{};
   Needle needle{};
   Need need{};
+  std::uint32_t reserved_too{};
   Float32Error float32_error{};
 };
 
@@ -66,7 +67,7 @@ struct Parameters {
 static_assert(std::has_unique_object_representations_v<Header>);
 static_assert(sizeof(Header) == 32 + sections * sizeof(SectionEntry));
 static_assert(std::has_unique_object_representations_v<Need> && std::is_trivially_copyable_v<Parameters>);
-static_assert(sizeof(Parameters) == 8 + 6 * sizeof(double) + 8 + sizeof(Needle) + sizeof(Need) + sizeof(Float32Error));
+static_assert(sizeof(Parameters) == 8 + 6 * sizeof(double) + 8 + sizeof(Needle) + sizeof(Need) + 4 + sizeof(Float32Error));
 static_assert(std::has_unique_object_representations_v<Cell> && sizeof(Vector2) == 16 && sizeof(element::Material) == 16);
 static_assert(std::is_trivially_copyable_v<contact::Law>);
 

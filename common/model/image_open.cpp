@@ -81,6 +81,7 @@ ImageStatus open(std::span<const std::byte> bytes, Image& image) noexcept {
   found.needle = p.needle;
   found.need = p.need;
   found.float32_error = p.float32_error;
+  found.checksum = header.checksum;
   if (const ImageStatus status = verify(found); status != ImageStatus::Ok) return status;
   image = found;
   return ImageStatus::Ok;

@@ -213,7 +213,6 @@ TEST(ModelImage, HostileContentIsNamed) {
   expect(ImageStatus::BadNeedle, {[](TinyImage& t) { t.image.needle.length_m = 0.0; }, [](TinyImage& t) { t.image.needle.length_m = nan; },
                                   [](TinyImage& t) { t.image.needle.radius_m = -1.0; }});
   expect(ImageStatus::TooLarge, {[](TinyImage& t) { t.image.need.contacts = capacity::contacts + 1; },
-                                 [](TinyImage& t) { t.image.need.embedding_nodes = capacity::embedding_nodes + 1; },
                                  [](TinyImage& t) { t.image.need.cells_per_bucket = capacity::cells_per_bucket + 1; },
                                  [](TinyImage& t) { t.image.need.ring_cells = capacity::ring_cells + 1; },
                                  [](TinyImage& t) { t.law.explicit_count = capacity::contacts + 1; },

@@ -84,7 +84,7 @@ struct TinyImage {
     image.tissue.buckets.size_m = {0.01, 0.02};
     image.tissue.buckets.count = {2, 1};
     image.needle = {0.1, 0.0007};
-    image.need = {.contacts = 20, .embedding_nodes = 9, .cells_per_bucket = 5, .ring_cells = 4};
+    image.need = {.contacts = 20, .cells_per_bucket = 5, .ring_cells = 4};
     image.float32_error = {6e-8, 1e-6};
   }
 
