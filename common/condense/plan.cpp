@@ -1,6 +1,7 @@
 #include "common/condense/plan.hpp"
 
 #include <fmt/format.h>
+#include <optional>
 
 #include <algorithm>
 #include <cmath>
@@ -147,8 +148,8 @@ void plan_cost(const scene::Scene& scene, WithVisible with_visible, Plan& plan) 
   cost.factor_bytes = factor_estimate(static_cast<double>(cost.unknowns), mesh.dimension());
 }
 
-Plan plan_checked(const scene::Scene& scene, WithVisible with_visible) {
-  fem::Mesh mesh = fem::make_mesh(scene.tissue);
+Plan plan_checked(const scene::Scene& scene, std::optional<fem::Mesh> given, WithVisible with_visible) {
+  fem::Mesh mesh = given ? std::move(*given) : fem::make_mesh(scene.tissue);
   check_method(scene, mesh.dimension() == 3);
   Candidates candidates = candidates_of(mesh, scene);
   Plan result{.mesh = std::move(mesh), .candidates = std::move(candidates)};
@@ -194,12 +195,21 @@ std::size_t peak_memory_bytes(const Cost& cost, std::size_t factor_bytes) {
          2 * cost.visible_bytes;
 }
 
-Plan plan(const scene::Scene& scene, WithVisible with_visible) {
+namespace {
+
+Plan plan_or_explain(const scene::Scene& scene, std::optional<fem::Mesh> mesh, WithVisible with_visible) {
   try {
-    return plan_checked(scene, with_visible);
+    return plan_checked(scene, std::move(mesh), with_visible);
   } catch (const fem::Error& error) {
     throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
   }
+}
+
+}  // namespace
+
+Plan plan(const scene::Scene& scene, WithVisible with_visible) { return plan_or_explain(scene, std::nullopt, with_visible); }
+Plan plan(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible) {
+  return plan_or_explain(scene, std::move(mesh), with_visible);
 }
 
 }  // namespace trocar::condense
