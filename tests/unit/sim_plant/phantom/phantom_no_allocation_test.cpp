@@ -22,8 +22,8 @@ namespace trocar::sim_plant {
 namespace {
 
 TEST(PhantomNoAllocation, ThroughInsertionTurnAndWithdrawal) {
-  PhantomConfig config = scene();
-  config.contact.velocity_law = pvc();
+  scene::Scene config = demo_scene();
+  config.contact->velocity = pvc();
   Hand hand(config);
   const std::size_t before = allocations;
   ASSERT_GT(before, 0u);  // the counter works
