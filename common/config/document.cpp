@@ -336,6 +336,26 @@ std::vector<Table> Table::tables(std::string_view key) const {
   return found;
 }
 
+std::vector<std::optional<Table>> Table::words_and_tables(std::string_view key, std::initializer_list<std::string_view> allowed,
+                                                          std::string_view remedy) const {
+  const toml::node* node = view_->find(key);
+  if (node == nullptr) view_->missing(key, fmt::format("[\"{}\"]", *allowed.begin()), remedy);
+  const toml::array* array = node->as_array();
+  if (array == nullptr || array->empty()) view_->wrong_type(key, "an array of texts and tables", remedy);
+  std::vector<std::optional<Table>> entries;
+  for (const toml::node& element : *array) {
+    if (const toml::table* table = element.as_table()) {
+      entries.emplace_back(Table(std::make_shared<const View>(View{view_->source, table, view_->full(key)})));
+      continue;
+    }
+    const toml::value<std::string>* text = element.as_string();
+    if (text == nullptr || std::find(allowed.begin(), allowed.end(), text->get()) == allowed.end())
+      fail(key, with_remedy(fmt::format("{} is not known here", show(element)), remedy));
+    entries.emplace_back(std::nullopt);
+  }
+  return entries;
+}
+
 bool Table::has(std::string_view key) const { return view_->find(key) != nullptr; }
 
 void Table::fail(std::string_view key, std::string_view problem_and_remedy) const { view_->fail(key, problem_and_remedy); }

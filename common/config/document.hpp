@@ -67,7 +67,10 @@ class Table {
   Table table(std::string_view key) const;
   std::optional<Table> optional_table(std::string_view key) const;
   std::vector<Table> tables(std::string_view key) const;  // [[key]], empty when there is none
-  bool has(std::string_view key) const;                   // and marks the key as known
+  // An array of words, each from `allowed` (nothing in its place), and of tables.
+  std::vector<std::optional<Table>> words_and_tables(std::string_view key, std::initializer_list<std::string_view> allowed,
+                                                     std::string_view remedy) const;
+  bool has(std::string_view key) const;  // and marks the key as known
 
   // Ends with an error at that key's line (at the table's line when the key is absent).
   [[noreturn]] void fail(std::string_view key, std::string_view problem_and_remedy) const;

@@ -8,7 +8,6 @@ namespace trocar::fem {
 namespace {
 
 constexpr std::array<const char*, 3> axis_name{"x", "y", "z"};
-constexpr double most_nodes = 5e6;  // 15 million unknowns: their factor alone would fill 100 GB
 
 std::string text(const Point& x, int dimension) {
   std::string out = "(" + std::to_string(x[0]) + ", " + std::to_string(x[1]);

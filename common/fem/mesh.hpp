@@ -12,6 +12,8 @@
 
 namespace trocar::fem {
 
+inline constexpr int most_nodes = 5'000'000;  // 15 million unknowns: their factor alone would fill 100 GB
+
 struct Mesh {
   Type type{};
   std::vector<Point> node{};

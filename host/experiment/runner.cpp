@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "common/config/rig_file.hpp"
-#include "common/config/scene_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/scene/scene.hpp"
 #include "host/rig/client.hpp"
 
 namespace trocar::host {
@@ -32,8 +32,10 @@ ExperimentSetup read_setup(const std::string& name, const std::vector<double>& s
   s.rig_file = config::find_share("rigs", s.experiment.rig);
   s.rig = config::read_twin(s.rig_file);
   s.scene_file = config::find_share("scenes", s.experiment.scene);
-  const config::SceneFile scene = config::read_scene(s.scene_file);
-  s.placement = {scene.tissue.grid.origin_m[1], scene.tissue.grid.origin_m[0] + 0.5 * scene.tissue.grid.size_m[0], scene.needle.length_m};
+  const scene::Scene scene = scene::read_scene(s.scene_file);
+  scene::require_rigid_insertion(scene);
+  const auto entry = scene::entry_m(scene);
+  s.placement = {entry[1], entry[0], scene.needle->length_m};
   for (std::size_t i = 0; i < s.rig.gain_sets; ++i)
     if (std::string(s.rig.gain_set[i].name.data()) == "thesis") s.thesis_stiffness_n_per_m = s.rig.gain_set[i].translation.proportional;
   try {  // poses that the rig cannot take are told before anything starts

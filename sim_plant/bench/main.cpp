@@ -13,11 +13,11 @@
 #include "common/capture/rig_capture.hpp"
 #include "common/capture/samples_csv.hpp"
 #include "common/config/rig_file.hpp"
-#include "common/config/scene_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
 #include "common/experiment/experiment.hpp"
 #include "common/experiment/experiment_file.hpp"
+#include "common/scene/scene.hpp"
 #include "common/wire/convert.hpp"
 #include "sim_plant/bench/bench.hpp"
 #include "sim_plant/plant/plant_file.hpp"
@@ -48,9 +48,10 @@ int run(const Options& options) {
     for (const double v : options.speeds_mm_s) e.speeds_m_s.push_back(1e-3 * v);
   }
   const rig::Rig rig = config::read_twin(config::find_share("rigs", e.rig));
-  const config::SceneFile scene = config::read_scene(config::find_share("scenes", e.scene));
-  const experiment::Placement placement{scene.tissue.grid.origin_m[1], scene.tissue.grid.origin_m[0] + 0.5 * scene.tissue.grid.size_m[0],
-                                        scene.needle.length_m};
+  const scene::Scene scene = scene::read_scene(config::find_share("scenes", e.scene));
+  scene::require_rigid_insertion(scene);
+  const auto entry = scene::entry_m(scene);
+  const experiment::Placement placement{entry[1], entry[0], scene.needle->length_m};
   experiment::Sequencer sequencer(e, placement, rig, session);
   sim_plant::Bench bench(rig, sim_plant::read_plant(config::find_share("plants", e.plant)), sim_plant::phantom_config(scene), options.seed);
 

@@ -3,38 +3,11 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "common/config/document.hpp"
-#include "common/fem/mesh.hpp"
 
 namespace trocar::sim_plant {
-namespace {
-
-fem::Box box_of(const config::SceneBox& box) {
-  fem::Box out;
-  for (std::size_t a = 0; a < 2; ++a) {
-    out.min_m[a] = box.min_m[a];
-    out.max_m[a] = box.max_m[a];
-  }
-  return out;
-}
-
-fem::Side side_of(config::GridEdge edge) {
-  switch (edge) {
-    case config::GridEdge::XMin:
-      return fem::Side::XMin;
-    case config::GridEdge::XMax:
-      return fem::Side::XMax;
-    case config::GridEdge::YMin:
-      return fem::Side::YMin;
-    case config::GridEdge::YMax:
-      break;
-  }
-  return fem::Side::YMax;
-}
-
-}  // namespace
-
 PlantConfig read_plant(const std::filesystem::path& file) {
   const config::Document document = config::Document::load(file);
   const config::Table root = document.root();
@@ -74,24 +47,16 @@ PlantConfig read_plant(const std::filesystem::path& file) {
   return plant;
 }
 
-PhantomConfig phantom_config(const config::SceneFile& scene) {
+PhantomConfig phantom_config(const scene::Scene& scene) {
+  scene::require_rigid_insertion(scene);
   PhantomConfig phantom;
-  phantom.tissue.model = scene.tissue.model == config::TissueModel::PlaneStress ? fem::Model::PlaneStress : fem::Model::PlaneStrain;
-  phantom.tissue.thickness_m = scene.tissue.thickness_m;
-  const config::SceneGrid& grid = scene.tissue.grid;
-  phantom.tissue.grid = fem::uniform_grid(grid.element == config::GridElement::Quad4 ? fem::Type::Quad4 : fem::Type::Tri3,
-                                          {grid.origin_m[0], grid.origin_m[1], 0.0}, {grid.size_m[0], grid.size_m[1], 0.0},
-                                          {grid.nodes[0], grid.nodes[1], 1});
-  for (const config::SceneMaterial& m : scene.tissue.materials) {
-    fem::Zone& zone = phantom.tissue.zones.emplace_back(fem::Zone{{m.young_pa, m.poisson}, {}, {}});
-    if (m.box) zone.box = box_of(*m.box);
+  phantom.tissue = scene.tissue;
+  phantom.needle.length_m = scene.needle->length_m;
+  phantom.contact = {scene.contact->shaft_n_per_m, scene.contact->tip_n_per_m, scene.contact->tip_zone_m, std::nullopt};
+  if (const contact::VelocityLaw& law = scene.contact->velocity; law.rows > 0) {
+    const auto rows = [&](const auto& column) { return std::vector<double>(column.begin(), column.begin() + law.rows); };
+    phantom.contact.velocity_law = VelocityLaw{scene.velocity_law, rows(law.speed_m_s), rows(law.shaft_n_per_m), rows(law.tip_n_per_m)};
   }
-  for (const config::SceneSupport& s : scene.tissue.supports)
-    phantom.tissue.supports.push_back({s.box ? fem::Where(box_of(*s.box)) : fem::Where(side_of(s.edge)), {s.fix_x, s.fix_y, false}});
-  phantom.needle.length_m = scene.needle.length_m;
-  phantom.contact = {scene.contact.shaft_n_per_m, scene.contact.tip_n_per_m, scene.contact.tip_zone_m, std::nullopt};
-  if (const auto& law = scene.contact.velocity_law)
-    phantom.contact.velocity_law = VelocityLaw{law->name, law->speed_m_s, law->shaft_n_per_m, law->tip_n_per_m};
   return phantom;
 }
 

@@ -10,7 +10,7 @@
 
 #include <filesystem>
 
-#include "common/config/scene_file.hpp"
+#include "common/scene/scene.hpp"
 #include "sim_plant/phantom/config.hpp"
 #include "sim_plant/plant/config.hpp"
 
@@ -19,6 +19,7 @@ namespace trocar::sim_plant {
 // Throws config::UserError with file, line, key and remedy.
 [[nodiscard]] PlantConfig read_plant(const std::filesystem::path& file);
 
-[[nodiscard]] PhantomConfig phantom_config(const config::SceneFile& scene);
+// Throws config::UserError for a scene that has no rigid insertion.
+[[nodiscard]] PhantomConfig phantom_config(const scene::Scene& scene);
 
 }  // namespace trocar::sim_plant

@@ -12,9 +12,9 @@
 #include <string>
 
 #include "common/config/rig_file.hpp"
-#include "common/config/scene_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/scene/scene.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
 #include "sim_plant/plant/plant_file.hpp"
@@ -44,7 +44,7 @@ int run(const Options& options) {
   const auto rig_file = config::find_share("rigs", options.rig);
   const rig::Rig rig = config::read_twin(rig_file);
   const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
-  const auto phantom = sim_plant::phantom_config(config::read_scene(config::find_share("scenes", options.scene)));
+  const auto phantom = sim_plant::phantom_config(scene::read_scene(config::find_share("scenes", options.scene)));
   hal::EndpointBus drives;
   hal::EndpointBus sensor;
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {

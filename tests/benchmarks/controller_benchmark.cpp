@@ -1,7 +1,7 @@
 // What one tick of the controller costs, alone and with bus and plant in lock-step. A tick has 1 ms.
 #include <benchmark/benchmark.h>
 
-#include "common/config/scene_file.hpp"
+#include "common/scene/scene.hpp"
 #include "fake_rig.hpp"
 #include "sim_plant/bench/bench.hpp"
 #include "sim_plant/plant/plant_file.hpp"
@@ -26,7 +26,7 @@ void LockStepTick(benchmark::State& run) {
   const std::filesystem::path share{TROCAR_SHARE};
   const rig::Rig rig = config::read_rig(share / "rigs/ubc_twin.toml");
   sim_plant::Bench bench(rig, sim_plant::read_plant(share / "plants/ubc_twin.toml"),
-                         sim_plant::phantom_config(config::read_scene(share / "scenes/phantom.toml")), 1);
+                         sim_plant::phantom_config(scene::read_scene(share / "scenes/phantom.toml")), 1);
   const auto send = [&](CommandKind kind, int ticks) {
     bench.mail().commands.push({.session = 1, .id = 1, .kind = kind});
     for (int i = 0; i < ticks; ++i) bench.tick();

@@ -16,7 +16,7 @@ using namespace trocar;
 using namespace trocar::sim_plant;
 
 std::filesystem::path shared(const char* file) { return std::filesystem::path(TROCAR_SHARE) / file; }
-PhantomConfig scene() { return phantom_config(config::read_scene(shared("scenes/phantom.toml"))); }
+PhantomConfig scene() { return phantom_config(scene::read_scene(shared("scenes/phantom.toml"))); }
 
 // range(0): depth of the tip in the tissue in mm, 0 in the air. A hand moves the handle to and fro by 3 mm, past stick and slip.
 void PlantMillisecond(benchmark::State& run) {

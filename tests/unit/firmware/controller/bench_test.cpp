@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/config/rig_file.hpp"
-#include "common/config/scene_file.hpp"
+#include "common/scene/scene.hpp"
 #include "sim_plant/bench/bench.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 
@@ -22,7 +22,7 @@ struct LockStep {
   std::vector<Reply> replies;
 
   explicit LockStep(std::uint64_t seed)
-      : bench(rig, read_plant(share / "plants/ubc_twin.toml"), phantom_config(config::read_scene(share / "scenes/phantom.toml")), seed) {}
+      : bench(rig, read_plant(share / "plants/ubc_twin.toml"), phantom_config(scene::read_scene(share / "scenes/phantom.toml")), seed) {}
 
   void tick(int n) {
     for (int i = 0; i < n; ++i) {

@@ -16,7 +16,7 @@ namespace trocar::sim_plant {
 inline std::filesystem::path shared(const std::string& file) { return std::filesystem::path(TROCAR_SHARE) / file; }
 inline rig::Rig shipped_rig() { return config::read_rig(shared("rigs/ubc_twin.toml")); }
 inline PlantConfig shipped_plant() { return read_plant(shared("plants/ubc_twin.toml")); }
-inline PhantomConfig shipped_phantom() { return phantom_config(config::read_scene(shared("scenes/phantom.toml"))); }
+inline PhantomConfig shipped_phantom() { return phantom_config(scene::read_scene(shared("scenes/phantom.toml"))); }
 
 struct Machine {
   explicit Machine(const PlantConfig& config = shipped_plant(), std::uint64_t seed = 1)
