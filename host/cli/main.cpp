@@ -15,6 +15,7 @@
 #include "host/capture/recorder.hpp"
 #include "host/cli/demo.hpp"
 #include "host/cli/rig_commands.hpp"
+#include "host/solve/solve.hpp"
 
 namespace {
 
@@ -70,6 +71,26 @@ int main(int argc, char** argv) {
   run_command->callback([&] {
     experiment.domain = domain;
     code = cli::run_demo(experiment, stop_asked);
+  });
+
+  auto* solve_command = app.add_subcommand("solve",
+                                           "static finite elements: displacements of a scene's tissue under loads on its nodes\nExample: "
+                                           "trocar solve phantom --loads loads.csv --out "
+                                           "displacements.csv --vtu fields.vtu\nLoads: x_m,y_m,fx_n,fy_n, for solids "
+                                           "x_m,y_m,z_m,fx_n,fy_n,fz_n; one node a row, forces on one node add up.\n"
+                                           "Results: node,x_m,y_m,ux_m,uy_m, for solids node,x_m,y_m,z_m,ux_m,uy_m,uz_m.");
+  host::SolveOptions solve;
+  std::string scene;
+  solve_command->add_option("scene", scene, "scene name, or path of its TOML file")->required();
+  solve_command->add_option("--loads", solve.loads, "CSV of forces")->required();
+  solve_command->add_option("--out", solve.out, "CSV of displacements, written anew")->required();
+  solve_command->add_option("--vtu", solve.vtu, "fields for ParaView: displacement, load, stress, material");
+  solve_command->add_flag("--json", json, "the summary as JSON on stdout");
+  solve_command->callback([&] {
+    solve.scene = config::find_share("scenes", scene);
+    solve.progress = [](const std::string& line) { fmt::print(stderr, "trocar solve: {}\n", line); };
+    const host::SolveSummary summary = host::run_solve(solve, stop_asked);
+    fmt::print("{}\n", json ? host::to_json(summary) : host::to_text(summary));
   });
 
   auto* record_command = app.add_subcommand(
