@@ -42,14 +42,18 @@ BallRule ball_rule(int n) {
   const Gauss line = gauss(n);
   const auto size = static_cast<std::size_t>(n);
   BallRule rule;
+  double sum = 0.0;
   for (std::size_t r = 0; r < size; ++r)
     for (std::size_t c = 0; c < size; ++c)
       for (std::size_t a = 0; a < size; ++a) {
+        // Equal steps of the polar angle rather than of its cosine: distances from the axis stay smooth at the poles.
         const double radius = line.x[r];
-        const double z = radius * line.x[c];
-        const double in_plane = radius * std::sqrt(1.0 - line.x[c] * line.x[c]);
+        const double polar = 0.5 * std::numbers::pi * line.x[c];
         const double azimuth = 0.5 * std::numbers::pi * line.x[a];
-        const double weight = 3.0 * radius * radius * line.w[r] * line.w[c] * line.w[a] / 8.0;
+        const double z = radius * std::cos(polar);
+        const double in_plane = radius * std::sin(polar);
+        const double weight = radius * radius * std::sin(polar) * line.w[r] * line.w[c] * line.w[a];
+        sum += 8.0 * weight;
         for (int octant = 0; octant < 8; ++octant) {
           rule.point.push_back({(octant & 1) != 0 ? -in_plane * std::cos(azimuth) : in_plane * std::cos(azimuth),
                                 (octant & 2) != 0 ? -in_plane * std::sin(azimuth) : in_plane * std::sin(azimuth),
@@ -57,6 +61,7 @@ BallRule ball_rule(int n) {
           rule.weight.push_back(weight);
         }
       }
+  for (double& w : rule.weight) w /= sum;
   return rule;
 }
 

@@ -16,14 +16,14 @@
 
 namespace trocar::condense {
 
-inline constexpr double ball_per_needle_radius = 1.4386506690141;  // e^(7/4) / 4
+inline constexpr double ball_per_needle_radius = 1.4386506690014327;  // e^(7/4) / 4
 
 struct NodeWeight {
   int node{};
   double weight{};
 };
 
-// Quadrature points and weights in a ball of radius 1: Gauss points in radius, in the cosine of the polar angle and in the azimuth, the two
+// Quadrature points and weights in a ball of radius 1: Gauss points in radius, polar angle and azimuth, the two
 // angles by hemispheres and quadrants, so that the rule has the symmetry of a brick mesh. 8 n^3 points; weights sum to 1.
 struct BallRule {
   std::vector<std::array<double, 3>> point{};
