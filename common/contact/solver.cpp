@@ -104,7 +104,16 @@ void Solver::replace(std::size_t i, std::span<const Block> row) noexcept {
   enter(i);
 }
 
-void Solver::replace_last(std::span<const Block> row) noexcept { replace(size_ - 1, row); }
+void Solver::replace_own(std::size_t i, const Block& own) noexcept {
+  const Block now = compliance(i, i);
+  if (now[0] == own[0] && now[1] == own[1] && now[3] == own[3]) return;
+  compliance_[2 * i][2 * i] = own[0];
+  compliance_[2 * i][2 * i + 1] = compliance_[2 * i + 1][2 * i] = own[1];
+  compliance_[2 * i + 1][2 * i + 1] = own[3];
+  evaluated_ = false;
+  withdraw(i);
+  enter(i);
+}
 
 void Solver::pop() noexcept {
   --size_;

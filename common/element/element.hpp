@@ -9,7 +9,9 @@
 // volume (x1-x0, x2-x0, x3-x0 right-handed); Hex8 bottom face (zeta = -1) counter-clockwise seen from above, then the top face.
 // Full integration: 1 point (Tri3, Tet4), 2 x 2 (Quad4), 2 x 2 x 2 (Hex8). BBar (Quad4, Hex8): the volumetric part of B is replaced by its
 // element mean (Hughes 1980), which removes locking near nu = 0.5 in plane strain and in solids; for Tri3 and Tet4 it changes nothing.
-// In plane stress BBar equals Full: there is no volumetric constraint to relax.
+// In plane stress BBar equals Full: there is no volumetric constraint to relax. Green-Lagrange BBar averages the trace of E alike; force
+// and tangent stay the derivatives of one energy, integral of E_bar:C:E_bar / 2, and u = 0 gives back the linear stiffness. BBar wants an
+// isotropic C.
 #pragma once
 
 #include <Eigen/Core>
@@ -53,9 +55,9 @@ void shape(Type type, const Eigen::Vector3d& natural, Shape& value, ShapeGradien
 [[nodiscard]] Status stiffness(Type type, Integration integration, const Corners& corner, const Elasticity& c, double thickness_m,
                                Stiffness& k) noexcept;
 
-// Green-Lagrange internal force and consistent tangent (exactly symmetric) at displacement u; zero when Inverted. BBar applies to the
-// linear stiffness alone: here it is full.
-[[nodiscard]] Status response(Type type, const Corners& corner, const Elasticity& c, double thickness_m, const Values& u, Values& force,
-                              Stiffness& tangent) noexcept;
+// Green-Lagrange internal force and consistent tangent (exactly symmetric) at displacement u; zero when Inverted, which looks at the
+// undeformed element.
+[[nodiscard]] Status response(Type type, Integration integration, const Corners& corner, const Elasticity& c, double thickness_m,
+                              const Values& u, Values& force, Stiffness& tangent) noexcept;
 
 }  // namespace trocar::element

@@ -1,0 +1,72 @@
+// A program of its own, because it replaces the allocator: no kernel allocates.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "common/element/element.hpp"
+
+namespace {
+std::size_t allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  std::abort();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+// Eigen's allocator goes around operator new; it is caught in the C library, unless a sanitizer needs that place for itself.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#endif
+
+namespace trocar::element {
+namespace {
+
+TEST(ElementNoAllocation, InAnyKernel) {
+  Corners quad = Corners::Zero();
+  quad.topLeftCorner<2, 4>() << 0, 1, 1.1, -0.1, 0, 0.1, 1, 0.9;
+  Corners brick = Corners::Zero();
+  brick << 0, 1, 1, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1;
+  Corners tet = Corners::Zero();
+  tet(0, 1) = tet(1, 2) = tet(2, 3) = 1.0;
+  Stiffness k;
+  Values u = Values::Constant(0.01), force;
+  Shape value;
+  ShapeGradient gradient;
+  Eigen::Vector3d natural;
+
+  const std::size_t at_start = allocations;
+  const Eigen::VectorXd counted = Eigen::VectorXd::Zero(100);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  ASSERT_GT(allocations, at_start);  // the counter works
+#endif
+  const std::size_t before = allocations;
+  bool good = true;
+  for (const Integration integration : {Integration::Full, Integration::BBar}) {
+    for (const Model model : {Model::PlaneStress, Model::PlaneStrain, Model::Solid}) {
+      const Elasticity c = elasticity(model, {25300.0, 0.48});
+      for (const Type type : {Type::Tri3, Type::Quad4, Type::Tet4, Type::Hex8}) {
+        if ((dimension(type) == 3) != (model == Model::Solid)) continue;
+        const Corners& corner = type == Type::Hex8 ? brick : type == Type::Tet4 ? tet : quad;
+        good = good && stiffness(type, integration, corner, c, 0.011, k) == Status::Ok;
+        good = good && response(type, integration, corner, c, 0.011, u, force, k) == Status::Ok;
+        good = good && natural_coordinates(type, corner, {0.6, 0.3, 0.05}, natural) && inside(type, natural, 0.0);
+        shape(type, natural, value, gradient);
+      }
+    }
+  }
+  const std::size_t after = allocations;
+  EXPECT_EQ(after, before);
+  EXPECT_TRUE(good);
+  EXPECT_EQ(counted.size(), 100);
+}
+
+}  // namespace
+}  // namespace trocar::element
