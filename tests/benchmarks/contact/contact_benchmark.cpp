@@ -19,6 +19,8 @@
 namespace trocar::bench {
 namespace {
 
+using enum Ratio::Goal;
+
 struct Options {
   std::filesystem::path out{};
   bool quick{};
@@ -123,12 +125,16 @@ void Bench::contact_ticks() {
 
   const double floor = median("floor", "dense_cholesky");
   for (const char* scene : {"turn_all_slip", "turn_all_stuck", "turn_half", "turn_to_and_fro"}) {
-    ratios_.push_back({fmt::format("{}: ours / floor", scene), median(scene, "ours") / floor, 3.0, true});
-    ratios_.push_back({fmt::format("{}: thesis / ours", scene), median(scene, "thesis") / median(scene, "ours"), 5.0, false});
+    ratios_.push_back({fmt::format("{}: ours / floor", scene), median(scene, "ours") / floor, AtMost, 3.0});
+    // A stuck contact's frame costs the thesis O(m), a slipping one's O(m^2): the goal is for insertion, where contacts slip.
+    const bool all_slip = std::strcmp(scene, "turn_all_slip") == 0;
+    ratios_.push_back(
+        {fmt::format("{}: thesis / ours", scene), median(scene, "thesis") / median(scene, "ours"), all_slip ? AtLeast : None, 5.0});
   }
   for (const char* scene : {"straight_advance", "straight_to_and_fro"})
-    ratios_.push_back({fmt::format("{}: ours / thesis", scene), median(scene, "ours") / median(scene, "thesis"), 2.0, true});
-  ratios_.push_back({"rest: ours / floor", median("rest", "ours") / floor, 0.2, true});
+    ratios_.push_back({fmt::format("{}: ours / thesis", scene), median(scene, "ours") / median(scene, "thesis"), AtMost, 2.0});
+  ratios_.push_back({"gains_a_contact: ours / floor", median("gains_a_contact", "ours") / floor, None, 0.0});
+  ratios_.push_back({"rest: ours / floor", median("rest", "ours") / floor, AtMost, 0.2});
 }
 
 // One exact tick after the other; the whole-mesh methods solve the same targets with the same states.
@@ -171,8 +177,9 @@ void Bench::whole_mesh() {
   add(rows, 32, sheet_.mesh.node.size());
   const double ours = median("whole_mesh", "ours");
   const double reused = std::min(median("whole_mesh", "full_reused_columns"), median("whole_mesh", "full_reused_iterations"));
-  ratios_.push_back({"10,000 nodes: sparse system with its factor reused / ours", reused / ours, 100.0, false});
-  ratios_.push_back({"10,000 nodes: sparse system refactored / ours", median("whole_mesh", "full_refactored") / ours, 1500.0, false});
+  ratios_.push_back({"10,000 nodes: one solve with the sparse factor / ours", median("whole_mesh", "full_displacement") / ours, None, 0.0});
+  ratios_.push_back({"10,000 nodes: sparse system with its factor reused / ours", reused / ours, AtLeast, 100.0});
+  ratios_.push_back({"10,000 nodes: sparse system refactored / ours", median("whole_mesh", "full_refactored") / ours, AtLeast, 1500.0});
 }
 
 void Bench::sizes() {
@@ -192,29 +199,35 @@ void Bench::sizes() {
   }
   for (const char* scene : {"contacts_turn", "contacts_warm"}) {
     const double exponent = std::log2(median(scene, "ours", 64) / median(scene, "ours", 8)) / 3.0;
-    if (std::strcmp(scene, "contacts_warm") == 0)
-      ratios_.push_back({"exponent of warm ticks over 8 to 64 contacts", exponent, 2.0, true});
-    else
-      fmt::print(stderr, "exponent of turning ticks over 8 to 64 contacts: {:.2f}\n", exponent);
+    const bool warm = std::strcmp(scene, "contacts_warm") == 0;
+    ratios_.push_back({fmt::format("{}: exponent over 8 to 64 contacts", scene), exponent, warm ? AtMost : None, 2.0});
   }
 }
 
 void Bench::meshes() {
   constexpr std::size_t contacts = 14;  // as many as the coarsest mesh has nodes on the needle
-  std::vector<double> ours;
+  std::vector<Row> light;
+  std::vector<std::size_t> sizes;
   for (const int side : {21, 32, 45, 71, 100, 150, 224}) {
     const partner::Sheet sheet = partner::make_sheet(side);
     std::vector<int> nodes;
     const Scene scene = scene_on(sheet, contacts, &nodes);
     std::vector<Row> rows = whole_mesh_rows("mesh_size", scene, sheet, nodes);
-    rows.push_back(course_row("mesh_size/ours", std::make_shared<Ours>(scene, Motion::TurnAndAdvance)));
-    rows.push_back(course_row("mesh_size/thesis", std::make_shared<Thesis>(scene, Motion::TurnAndAdvance)));
     measure(rows, options_.turns(5));
     add(rows, contacts, sheet.mesh.node.size());
-    ours.push_back(rows[4].median_s);
+    for (int each = 0; each < 2; ++each) sizes.push_back(sheet.mesh.node.size());
+    light.push_back(course_row("mesh_size/ours", std::make_shared<Ours>(scene, Motion::TurnAndAdvance)));
+    light.push_back(course_row("mesh_size/thesis", std::make_shared<Thesis>(scene, Motion::TurnAndAdvance)));
   }
-  const auto [least, most] = std::minmax_element(ours.begin(), ours.end());
-  ratios_.push_back({"441 to 50,176 nodes: dearest / cheapest tick", *most / *least, 1.2, true});
+  measure(light, options_.turns(41));
+  double least = light[0].median_s, most = least;
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    add({light[k]}, contacts, sizes[k]);
+    if (k % 2 == 1) continue;
+    least = std::min(least, light[k].median_s);
+    most = std::max(most, light[k].median_s);
+  }
+  ratios_.push_back({"441 to 50,176 nodes: dearest / cheapest tick", most / least, AtMost, 1.2});
 }
 
 // The exact solution along a course of its own, tick by tick, by the reference.

@@ -16,6 +16,7 @@ constexpr double turn_rad = 0.02;
 constexpr double turn_ticks = 500.0;  // 2 Hz at 1 kHz, at most 0.25 mrad a tick
 constexpr long entering_ticks = 200;
 constexpr double entering_m = 1e-4;  // a tick, until all contacts slip
+constexpr double stroke_m = 8e-3;    // to either side over 2000 ticks, at most 25 mm/s: every contact sticks and slips
 constexpr double advance_m = 1e-5;   // a tick, 10 mm/s
 
 }  // namespace
@@ -51,7 +52,7 @@ reference::Pose Course::pose(long tick) const {
       turn = turn_rad * std::sin(phase);
       [[fallthrough]];
     case Motion::ToAndFro:
-      along_m = 2e-3 * std::sin(0.7 * phase);
+      along_m = stroke_m * std::sin(phase / 4.0);
       break;
     case Motion::Rest:
       turn = 0.5 * turn_rad;
@@ -109,9 +110,9 @@ double Ours::tick() {
 }
 
 double Ours::tick_that_gains() {
-  take(course_.next());
   solver_->pop();
   static_cast<void>(solver_->solve(std::span(target_).first(target_.size() - 1)));
+  take(course_.next());
   contact::Solution solution;
   const double seconds = timed([&] {
     solver_->push(last_row_);

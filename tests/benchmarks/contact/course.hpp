@@ -20,7 +20,7 @@ enum class Motion {
   TurnStuck,       // every frame changes, no contact slips
   TurnHalf,        // every frame changes, every second contact slips under a constant force
   Advance,         // straight, all slip: nothing is exchanged
-  ToAndFro,        // straight, 2 mm to and fro: contacts stick and slip
+  ToAndFro,        // straight, 8 mm to and fro: contacts stick and slip
   TurnToAndFro,    // both
   Rest             // the same pose
 };

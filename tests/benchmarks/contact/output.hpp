@@ -1,6 +1,7 @@
 // What the benchmark leaves: a table on the terminal, CSV files and two figures.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -20,12 +21,12 @@ struct Error {
   double median_s{};
 };
 
-// A figure that issue-level goals are stated for: `value` is compared with `goal` from below or above.
 struct Ratio {
+  enum class Goal : std::uint8_t { None, AtMost, AtLeast };
   std::string what{};
   double value{};
+  Goal kind{};
   double goal{};
-  bool at_most{};
 };
 
 void print(const std::vector<Timing>& timings);

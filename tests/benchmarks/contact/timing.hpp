@@ -26,15 +26,27 @@ struct Row {
   double quartile_s[2]{};
 };
 
+// A tick of microseconds that took a third of a millisecond was interrupted by another process: that says nothing about the tick.
+inline double mean_of_uninterrupted(std::vector<double>& seconds) {
+  std::vector<double> sorted = seconds;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double limit = std::max(3e-4, 30.0 * sorted[sorted.size() / 2]);
+  double sum = 0.0, count = 0.0;
+  for (const double each : seconds)
+    if (each <= limit) sum += each, count += 1.0;
+  return sum / count;
+}
+
 // `turns` times round all rows. Each turn's figure is the mean of its ticks, so that rare exchanges count with their share.
 inline void measure(std::vector<Row>& rows, int turns) {
   std::vector<std::vector<double>> figure(rows.size());
+  std::vector<double> seconds;
   for (int turn = -1; turn < turns; ++turn)  // the first turn warms up
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      double sum = 0.0;
+      seconds.clear();
       const int ticks = turn < 0 ? std::min(rows[k].ticks, 20) : rows[k].ticks;
-      for (int i = 0; i < ticks; ++i) sum += rows[k].tick();
-      if (turn >= 0) figure[k].push_back(sum / ticks);
+      for (int i = 0; i < ticks; ++i) seconds.push_back(rows[k].tick());
+      if (turn >= 0) figure[k].push_back(mean_of_uninterrupted(seconds));
     }
   for (std::size_t k = 0; k < rows.size(); ++k) {
     std::sort(figure[k].begin(), figure[k].end());
