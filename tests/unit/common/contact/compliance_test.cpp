@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
                             .integration = element::Integration::BBar,
                             .zones = layers,
                             .distortion = 0.1}}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& made) { return made.param.name; });
 
 TEST_P(ComplianceOnMesh, IsThatOfTheFullSystem) {
   std::vector<Embedding> at;

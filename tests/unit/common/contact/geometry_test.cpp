@@ -33,7 +33,7 @@ INSTANTIATE_TEST_SUITE_P(Meshes, GeometryOnMesh,
                                            Mesh{"quad", {.nodes_x = 11, .nodes_y = 11}},
                                            Mesh{"bent_tri", {.element = fem::Type::Tri3, .nodes_x = 11, .nodes_y = 11, .distortion = 0.25}},
                                            Mesh{"bent_quad", {.nodes_x = 11, .nodes_y = 11, .distortion = 0.25}}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& made) { return made.param.name; });
 
 TEST_P(GeometryOnMesh, LocatesPointsWhereAnotherSearchDoes) {
   const fem::Locator locator(grid.mesh());

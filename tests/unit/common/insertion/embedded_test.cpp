@@ -61,7 +61,8 @@ TEST(Embedded, ForceChangesByTheLengthNewlyCovered) {
         hand.move(-1e-4 * std::sin(theta), 1e-4 * std::cos(theta));
         const double force = hand.axis()[0] * hand.base().fx_n + hand.axis()[1] * hand.base().fy_n;
         const double zone = std::min(hand.path_m(), 0.0025) - std::min(covered, 0.0025);
-        EXPECT_NEAR(force - before, shaft_n_per_m * (hand.path_m() - covered) + 34.0 * zone, 0.025) << i << ' ' << theta << ' ' << distortion;
+        EXPECT_NEAR(force - before, shaft_n_per_m * (hand.path_m() - covered) + 34.0 * zone, 0.025)
+            << i << ' ' << theta << ' ' << distortion;
         covered = hand.path_m();
         before = force;
       }
@@ -114,7 +115,9 @@ TEST(Embedded, LeavesALoadedPathWithoutKicks) {
   double worst = 0.0;
   hand.move(
       0.0, -0.08, 0.0, 1e-3,
-      [&](const Wrench& old, const Result& now) { worst = std::max(worst, std::hypot(now.base.fx_n - old.fx_n, now.base.fy_n - old.fy_n)); },
+      [&](const Wrench& old, const Result& now) {
+        worst = std::max(worst, std::hypot(now.base.fx_n - old.fx_n, now.base.fy_n - old.fy_n));
+      },
       1e-5);
   EXPECT_LT(worst, 0.01);  // per 10 um
   EXPECT_EQ(hand.model().contacts(), 0u);
@@ -165,7 +168,8 @@ TEST(Embedded, NamesTheEndOfTheCandidates) {
   std::vector<model::Cell> kept;
   std::vector<std::uint8_t> flags(grid.image().tissue.node_flags.begin(), grid.image().tissue.node_flags.end());
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    const bool inside = std::all_of(cells[c].node.begin(), cells[c].node.end(), [&](std::uint32_t n) { return grid.mesh().node[n][0] < 0.0101; });
+    const bool inside =
+        std::all_of(cells[c].node.begin(), cells[c].node.end(), [&](std::uint32_t n) { return grid.mesh().node[n][0] < 0.0101; });
     if (!inside) continue;
     renumbered[c] = static_cast<std::int32_t>(kept.size());
     kept.push_back(cells[c]);

@@ -37,7 +37,8 @@ inline constexpr double tip_excess_n = (68.0 - 34.0) * 0.0025;
 // The tissue begins at y = 0; starts with the tip 5 mm in front of it.
 class Hand {
  public:
-  explicit Hand(const reference::GridImage& grid, contact::Method method = contact::Method::Embedded) : law_(grid.law), image_(grid.image()) {
+  explicit Hand(const reference::GridImage& grid, contact::Method method = contact::Method::Embedded)
+      : law_(grid.law), image_(grid.image()) {
     law_.method = method;
     open();
   }
@@ -93,10 +94,12 @@ class Hand {
   double worst_residual_n_{};
 };
 
-[[nodiscard]] inline std::array<double, 3> wrench_of(const Result& result) { return {result.base.fx_n, result.base.fy_n, result.base.tau_nm}; }
+[[nodiscard]] inline std::array<double, 3> wrench_of(const Result& result) {
+  return {result.base.fx_n, result.base.fy_n, result.base.tau_nm};
+}
 
 struct Balance {
-  double wrench{};     // largest difference in N, and in N m over the needle's length
+  double wrench{};      // largest difference in N, and in N m over the needle's length
   double off_axis_m{};  // farthest that a contact's tissue lies from the needle's axis
 };
 
@@ -128,8 +131,8 @@ struct Balance {
     sum.tau_nm += arm[0] * f[1] - arm[1] * f[0];
     balance.off_axis_m = std::max(balance.off_axis_m, std::abs(t[0] * arm[1] - t[1] * arm[0]));
   }
-  balance.wrench = std::max({std::abs(sum.fx_n - hand.base().fx_n), std::abs(sum.fy_n - hand.base().fy_n),
-                             std::abs(sum.tau_nm - hand.base().tau_nm) / needle_m});
+  balance.wrench = std::max(
+      {std::abs(sum.fx_n - hand.base().fx_n), std::abs(sum.fy_n - hand.base().fy_n), std::abs(sum.tau_nm - hand.base().tau_nm) / needle_m});
   return balance;
 }
 

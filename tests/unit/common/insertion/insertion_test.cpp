@@ -29,14 +29,16 @@ class InsertionBy : public ::testing::TestWithParam<Case> {
 
 INSTANTIATE_TEST_SUITE_P(
     Methods, InsertionBy,
-    ::testing::Values(
-        Case{"embedded_tri", fem::Type::Tri3, 0.0, Method::Embedded}, Case{"embedded_quad", fem::Type::Quad4, 0.0, Method::Embedded},
-        Case{"embedded_bent_tri", fem::Type::Tri3, 0.2, Method::Embedded}, Case{"embedded_bent_quad", fem::Type::Quad4, 0.2, Method::Embedded},
-        Case{"snap_tri", fem::Type::Tri3, 0.0, Method::Snap}, Case{"snap_quad", fem::Type::Quad4, 0.0, Method::Snap},
-        Case{"snap_bent_tri", fem::Type::Tri3, 0.2, Method::Snap}, Case{"snap_bent_quad", fem::Type::Quad4, 0.2, Method::Snap},
-        Case{"adapt_tri", fem::Type::Tri3, 0.0, Method::Adapt}, Case{"adapt_quad", fem::Type::Quad4, 0.0, Method::Adapt},
-        Case{"adapt_bent_tri", fem::Type::Tri3, 0.2, Method::Adapt}, Case{"adapt_bent_quad", fem::Type::Quad4, 0.2, Method::Adapt}),
-    [](const auto& info) { return info.param.name; });
+    ::testing::Values(Case{"embedded_tri", fem::Type::Tri3, 0.0, Method::Embedded},
+                      Case{"embedded_quad", fem::Type::Quad4, 0.0, Method::Embedded},
+                      Case{"embedded_bent_tri", fem::Type::Tri3, 0.2, Method::Embedded},
+                      Case{"embedded_bent_quad", fem::Type::Quad4, 0.2, Method::Embedded},
+                      Case{"snap_tri", fem::Type::Tri3, 0.0, Method::Snap}, Case{"snap_quad", fem::Type::Quad4, 0.0, Method::Snap},
+                      Case{"snap_bent_tri", fem::Type::Tri3, 0.2, Method::Snap},
+                      Case{"snap_bent_quad", fem::Type::Quad4, 0.2, Method::Snap}, Case{"adapt_tri", fem::Type::Tri3, 0.0, Method::Adapt},
+                      Case{"adapt_quad", fem::Type::Quad4, 0.0, Method::Adapt}, Case{"adapt_bent_tri", fem::Type::Tri3, 0.2, Method::Adapt},
+                      Case{"adapt_bent_quad", fem::Type::Quad4, 0.2, Method::Adapt}),
+    [](const auto& made) { return made.param.name; });
 
 // Once everything slips, the force is the density times the path, and the tip's excess.
 TEST_P(InsertionBy, TheBaseCarriesTheDensityTimesThePath) {
@@ -190,7 +192,8 @@ TEST_P(InsertionBy, SkippingChangesNoResult) {
   computes.model().skip(false);
   long skipped = 0;
   long computed = 0;
-  for (const Pose& by : {Pose{0.001, 0.05, 0.0}, Pose{0.0, -0.004, 0.0}, Pose{0.0015, 0.002, 0.03}, Pose{0.0, 0.02, 0.0}, Pose{0.0, -0.08, -0.03}}) {
+  for (const Pose& by :
+       {Pose{0.001, 0.05, 0.0}, Pose{0.0, -0.004, 0.0}, Pose{0.0015, 0.002, 0.03}, Pose{0.0, 0.02, 0.0}, Pose{0.0, -0.08, -0.03}}) {
     constexpr int steps = 400;
     for (int k = 0; k < steps; ++k) {
       for (Hand* hand : {&skips, &computes}) {
