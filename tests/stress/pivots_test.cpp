@@ -1,6 +1,7 @@
 // Millions of exchanges on random compliances: nothing may build up.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>

@@ -34,7 +34,7 @@ void walk_by_every_method(const reference::GridImage& grid, contact::Law law, co
 
 const reference::GridImage& soft(fem::Type type) {
   static const reference::GridImage tri({.element = fem::Type::Tri3});
-  static const reference::GridImage quad({});
+  static const reference::GridImage quad(reference::Block{});
   return type == fem::Type::Tri3 ? tri : quad;
 }
 

@@ -27,7 +27,7 @@ inline constexpr double tip_excess_n = (68.0 - 34.0) * 0.0025;
 // Building an image takes a while: one for each kind of mesh in a program.
 [[nodiscard]] inline reference::GridImage& grid_of(fem::Type type, double distortion = 0.0) {
   static reference::GridImage tri({.element = fem::Type::Tri3});
-  static reference::GridImage quad({});
+  static reference::GridImage quad(reference::Block{});
   static reference::GridImage bent_tri({.element = fem::Type::Tri3, .distortion = 0.2});
   static reference::GridImage bent_quad({.distortion = 0.2});
   if (distortion > 0.0) return type == fem::Type::Tri3 ? bent_tri : bent_quad;

@@ -91,7 +91,7 @@ TEST_P(InsertionBy, SticksOnReversalThenPullsBackThenLetsGo) {
   const double path = hand.path_m();
   hand.move(0.0, -0.0002);
   std::size_t stuck = 0;
-  for (std::size_t i = 0; i < hand.model().contacts(); ++i) stuck += hand.model().contact(i).state == State::Stuck ? 1 : 0;
+  for (std::size_t i = 0; i < hand.model().contacts(); ++i) stuck += hand.model().contact(i).state == State::Stuck ? 1U : 0U;
   EXPECT_GE(stuck + 2, hand.model().contacts());
   EXPECT_LT(hand.base().fy_n, pushed);
   EXPECT_GT(hand.base().fy_n, 0.85 * pushed);
