@@ -130,6 +130,8 @@ TEST(SolverSequence, ForgettingTheFactorChangesNoBit) {
       c.gap_m[0] += random.uniform(-1e-4, 1e-4);
       if (turn != 0.0) c.tangent = {std::cos(turn), std::sin(turn)};
     }
+    // And single ones, as a contact that is new has another frame than those that were there.
+    if (k % 7 == 6) contact[random.below(s)].tangent = {std::cos(0.02), std::sin(0.02)};
     if (k % 37 == 36) {  // another history: the contact goes and comes back
       for (Solver* solver : {keeps.get(), forgets.get()}) {
         solver->pop();
