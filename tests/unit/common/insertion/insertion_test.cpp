@@ -299,17 +299,24 @@ TEST_P(InsertionBy, PassesThroughTheFarFaceWithoutNewContacts) {
 
 TEST_P(InsertionBy, TakesPosesBeyondAllSense) {
   Hand hand(grid(), GetParam().method);
+  hand.law().velocity = rising_law();
+  hand.open();
   hand.move(0.0, 0.04);
   for (const double huge : {1e3, 1e10, 1e100, 1e300, std::numeric_limits<double>::max(), std::numeric_limits<double>::denorm_min()}) {
     for (const Pose& pose : {Pose{huge, -0.06, 1.57}, Pose{0.0, -huge, 1.57}, Pose{0.0, huge, 1.57}, Pose{0.0, -0.06, huge}}) {
       const Result result = hand.model().step(pose, 1e-3);
       for (const double value : wrench_of(result)) EXPECT_TRUE(std::isfinite(value)) << huge << ' ' << to_string(result.status);
       EXPECT_TRUE(std::isfinite(result.path_m));
+      EXPECT_TRUE(std::isfinite(hand.model().speed_m_s())) << huge;
     }
   }
   hand.pose = {0.0, -1.0, std::numbers::pi / 2};
   for (int k = 0; k < 3; ++k) hand.step();
+  hand.model().reset();  // the speed of that
   Hand fresh(grid(), GetParam().method);
+  fresh.law().velocity = rising_law();
+  fresh.open();
+  fresh.model().reset();
   for (Hand* h : {&hand, &fresh}) {
     h->pose = {0.001, -needle_m - 0.005, std::numbers::pi / 2};
     h->step();
