@@ -104,7 +104,16 @@ void Solver::replace(std::size_t i, std::span<const Block> row) noexcept {
   enter(i);
 }
 
-void Solver::replace_last(std::span<const Block> row) noexcept { replace(size_ - 1, row); }
+void Solver::replace_own(std::size_t i, const Block& own) noexcept {
+  const Block now = compliance(i, i);
+  if (now[0] == own[0] && now[1] == own[1] && now[3] == own[3]) return;
+  compliance_[2 * i][2 * i] = own[0];
+  compliance_[2 * i][2 * i + 1] = compliance_[2 * i + 1][2 * i] = own[1];
+  compliance_[2 * i + 1][2 * i + 1] = own[3];
+  evaluated_ = false;
+  withdraw(i);
+  enter(i);
+}
 
 void Solver::pop() noexcept {
   --size_;
@@ -376,6 +385,16 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     for (std::size_t i = 0; i < size_; ++i) set_axial(i, std::clamp(contact_[i].axial_n, target[i].lower_n, target[i].upper_n));
     evaluate();
     judge(target, v);
+  }
+  if (!std::isfinite(v.residual_n)) {
+    // Nothing that is no number may reach the next tick.
+    for (std::size_t i = 0; i < size_; ++i) {
+      contact_[i].axial_n = contact_[i].lateral_n = 0.0;
+      contact_[i].force_n = {};
+      force_[2 * i] = force_[2 * i + 1] = 0.0;
+    }
+    evaluated_ = false;
+    evaluate();
   }
   solution.residual_n = v.residual_n;
   if (!(v.residual_n <= tolerance_n)) solution.status = limited ? SolverStatus::PivotLimit : SolverStatus::IllConditioned;

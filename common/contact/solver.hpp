@@ -74,10 +74,9 @@ class Solver {
   // `row[j]` couples the new contact with contact j < size(), row[size()] is its own block (any regularisation already in it).
   // It starts force-free and slipping forward. Precondition: size() < capacity.
   void push(std::span<const Block> row) noexcept;
-  // The last contact's compliance changed (a segment that grew); its force and state stay.
-  void replace_last(std::span<const Block> row) noexcept;
-  // Any compliance changed (mesh adaptation): blocks of contact i with contacts 0 … i.
+  // The compliance of contact i changed: blocks with contacts 0 … i. Forces and states stay.
   void replace(std::size_t i, std::span<const Block> row) noexcept;
+  void replace_own(std::size_t i, const Block& own) noexcept;
   void pop() noexcept;
   void clear() noexcept;
 

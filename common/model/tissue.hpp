@@ -28,7 +28,7 @@ struct Cell {  // triangle or quad, counter-clockwise
 
 inline constexpr std::uint8_t fixed_x = 1;
 inline constexpr std::uint8_t fixed_y = 2;
-inline constexpr std::uint8_t whole_ring = 4;  // all cells around this node are candidates: it may be moved
+inline constexpr std::uint8_t whole_ring = 4;  // all cells around this node are candidates, at most capacity::ring_cells: it may be moved
 
 // Uniform buckets over the candidates' bounding box; bucket (i, j) holds cells [begin[b], begin[b + 1]) of `cell`, b = j * count[0] + i,
 // which are all that overlap it.
@@ -39,6 +39,15 @@ struct Buckets {
   std::span<const std::uint32_t> begin{};
   std::span<const std::uint32_t> cell{};
 };
+
+// Row or column of a coordinate, the nearest one outside of the box. Writer, reader and search share this rounding: a cell is listed in
+// every bucket between those of its bounding box's corners, so whatever lies in the cell is found in its own bucket.
+[[nodiscard]] constexpr std::uint32_t bucket_index(const Buckets& buckets, std::size_t axis, double x_m) noexcept {
+  const double place = (x_m - buckets.origin_m[axis]) / buckets.size_m[axis];
+  if (!(place > 0.0)) return 0;
+  const std::uint32_t last = buckets.count[axis] - 1;
+  return place >= static_cast<double>(last) ? last : static_cast<std::uint32_t>(place);
+}
 
 struct Tissue {
   element::Model model{};

@@ -1,0 +1,218 @@
+#include "common/condense/plan.hpp"
+
+#include <fmt/format.h>
+#include <optional>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "common/config/user_error.hpp"
+#include "common/core/capacities.hpp"
+
+namespace trocar::condense {
+namespace {
+
+using fem::Type;
+
+// Corners of the faces of each solid element, counter-clockwise from outside; a triangle repeats none and ends with -1.
+constexpr std::array<std::array<int, 4>, 4> tet_faces{{{0, 2, 1, -1}, {0, 1, 3, -1}, {1, 2, 3, -1}, {0, 3, 2, -1}}};
+constexpr std::array<std::array<int, 4>, 6> brick_faces{
+    {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
+
+// Faces whose nodes are all visible; of a solid only those on its surface.
+std::vector<image_file::Face> faces_of(const fem::Mesh& mesh, const std::vector<int>& visible) {
+  std::vector<std::uint32_t> place(mesh.node.size(), image_file::no_corner);
+  for (std::size_t v = 0; v < visible.size(); ++v) place[static_cast<std::size_t>(visible[v])] = static_cast<std::uint32_t>(v);
+  std::vector<image_file::Face> faces;
+  std::map<image_file::Face, std::size_t> seen;  // sorted corners of a solid's faces
+  std::vector<std::size_t> times;
+  const auto add = [&](const std::array<int, 8>& element, std::span<const int> corners) {
+    image_file::Face face{image_file::no_corner, image_file::no_corner, image_file::no_corner, image_file::no_corner};
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      if (corners[k] < 0) continue;
+      face[k] = place[static_cast<std::size_t>(element[static_cast<std::size_t>(corners[k])])];
+      if (face[k] == image_file::no_corner) return;
+    }
+    image_file::Face key = face;
+    std::sort(key.begin(), key.end());
+    const auto [at, fresh] = seen.emplace(key, faces.size());
+    if (fresh) {
+      faces.push_back(face);
+      times.push_back(1);
+    } else {
+      ++times[at->second];
+    }
+  };
+  for (const auto& element : mesh.element) {
+    switch (mesh.type) {
+      case Type::Tri3:
+        add(element, std::array{0, 1, 2});
+        break;
+      case Type::Quad4:
+        add(element, std::array{0, 1, 2, 3});
+        break;
+      case Type::Tet4:
+        for (const auto& face : tet_faces) add(element, face);
+        break;
+      case Type::Hex8:
+        for (const auto& face : brick_faces) add(element, face);
+        break;
+    }
+  }
+  std::vector<image_file::Face> outer;
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (times[f] == 1) outer.push_back(faces[f]);
+  return outer;
+}
+
+Visible visible_of(const fem::Mesh& mesh, const fem::Where& where) {
+  Visible visible;
+  visible.node = fem::nodes_at(mesh, where);
+  if (visible.node.empty()) throw fem::Error("contact.visible holds no node of the mesh; name a side or a group that does");
+  for (const int n : visible.node) visible.node_m.push_back(mesh.node[static_cast<std::size_t>(n)]);
+  visible.face = faces_of(mesh, visible.node);
+  return visible;
+}
+
+// Nonzeros of a factor in nested dissection: n log2 n in the plane, n^(4/3) in space; the constants fit bricks and quads in CHOLMOD
+// with METIS from 400 to 150,000 unknowns to a factor of about 1.5 (thin plates take less).
+std::size_t factor_estimate(double unknowns, int dimension) {
+  const double n = std::max(2.0, unknowns);
+  const double nonzeros = dimension == 2 ? 7.0 * n * std::log2(n) : 20.0 * std::pow(n, 4.0 / 3.0);
+  return static_cast<std::size_t>(8.0 * nonzeros);
+}
+
+// What fits in one image, or an error that names the key.
+void check_method(const scene::Scene& scene, bool solid) {
+  if (!scene.needle || !scene.contact)
+    throw fem::Error("no [needle] or no [contact]: an image needs both; write them as in host/share/scenes");
+  if (scene.needle->model != scene::NeedleModel::Rigid)
+    throw fem::Error("needle.model: images hold rigid needles only, others are not available yet; write model = \"rigid\"");
+  if (scene.contact->method == contact::Method::Subdivide)
+    throw fem::Error(
+        "contact.method = \"subdivide\" changes the unknowns, which an image cannot; write \"embedded\", \"snap\" or \"adapt\"");
+  if (scene.contact->method == contact::Method::Adapt && solid)
+    throw fem::Error("contact.method = \"adapt\" moves nodes of planar elements, and this tissue is solid; write \"embedded\" or \"snap\"");
+  if (scene.tissue.strain != fem::Strain::Linear)
+    throw fem::Error("tissue.strain = \"green_lagrange\" cannot be condensed; write \"linear\"");
+}
+
+// Length of needle that the candidates can hold at most.
+double reach_m(const Candidates& c, double needle_m) {
+  const model::Vector2 size{c.buckets.size_m[0] * c.buckets.count[0], c.buckets.size_m[1] * c.buckets.count[1]};
+  return std::min(needle_m, std::hypot(size[0], size[1]));
+}
+
+void plan_contacts(const scene::Scene& scene, Plan& plan) {
+  const Candidates& c = plan.candidates;
+  plan.law = *scene.contact;
+  const double reach = reach_m(c, scene.needle->length_m);
+  const bool given = plan.law.spacing_m > 0.0;
+  // One force per edge alternates along the path: the edges' averages hardly feel such a load (inf-sup). 1.5 edges keep it off, 2 cost
+  // detail.
+  constexpr double edges_per_segment = 1.5;
+  if (!given) plan.law.spacing_m = std::max(edges_per_segment * c.edge_length_m, reach / static_cast<double>(capacity::contacts));
+  if (plan.law.explicit_count > capacity::contacts)
+    throw fem::Error(
+        fmt::format("contact.points_m has {} contacts and the capacity is {}; give fewer", plan.law.explicit_count, capacity::contacts));
+  for (std::size_t i = 0; i < plan.law.explicit_count; ++i) {
+    const auto& x = plan.law.explicit_point_m[i];
+    if (cell_at(c.node_m, c.cell, c.buckets, x) < 0)
+      throw fem::Error(fmt::format("contact.points_m[{}] = ({}, {}) m lies outside of the tissue{}; move it inside", i, x[0], x[1],
+                                   scene.corridor ? " in contact.corridor" : ""));
+  }
+  // A node method makes a contact where the needle crosses an edge.
+  const bool nodes = plan.law.method != contact::Method::Embedded;
+  const double spacing = nodes ? c.edge_length_m : plan.law.spacing_m;
+  const double contacts = plan.law.explicit_count > 0 ? plan.law.explicit_count : std::ceil(reach / spacing * (1.0 - 1e-12));
+  if (contacts > static_cast<double>(capacity::contacts))
+    throw fem::Error(
+        fmt::format("a needle with {:.4g} m in the tissue makes {:.0f} contacts, one every {:.4g} m, and the capacity is {}; {}", reach,
+                    contacts, spacing, capacity::contacts,
+                    nodes ? "take a coarser mesh, a shorter needle or the method \"embedded\"" : "give a larger contact.spacing_m"));
+  plan.need.contacts = static_cast<std::uint32_t>(contacts);
+  plan.need.cells_per_bucket = c.buckets.longest;
+  for (std::size_t n = 0; n < c.node_m.size(); ++n)
+    if ((c.flags[n] & model::whole_ring) != 0)
+      plan.need.ring_cells = std::max(plan.need.ring_cells, static_cast<std::uint32_t>(c.ring[n].size()));
+}
+
+void plan_cost(const scene::Scene& scene, WithVisible with_visible, Plan& plan) {
+  Cost& cost = plan.cost;
+  const fem::Mesh& mesh = plan.mesh;
+  cost.unknowns = mesh.node.size() * static_cast<std::size_t>(mesh.dimension());
+  cost.columns = plan.candidates.columns();
+  const std::size_t entry = plan.single_precision ? sizeof(float) : sizeof(double);
+  cost.image_bytes = model::image_size(plan.image(scene)) + cost.columns * cost.columns * entry;
+  if (with_visible == WithVisible::Yes)
+    cost.visible_bytes = image_file::visible_size(static_cast<std::uint32_t>(mesh.dimension()), plan.visible.node.size(),
+                                                  plan.visible.face.size(), cost.columns);
+  cost.factor_bytes = factor_estimate(static_cast<double>(cost.unknowns), mesh.dimension());
+}
+
+Plan plan_checked(const scene::Scene& scene, std::optional<fem::Mesh> given, WithVisible with_visible) {
+  fem::Mesh mesh = given ? std::move(*given) : fem::make_mesh(scene.tissue);
+  check_method(scene, mesh.dimension() == 3);
+  Candidates candidates = candidates_of(mesh, scene);
+  Plan result{.mesh = std::move(mesh), .candidates = std::move(candidates)};
+  result.needle = {scene.needle->length_m, 0.5 * scene.needle->outer_m.value_or(0.0)};
+  result.single_precision = scene.single_precision;
+  if (with_visible == WithVisible::Yes) result.visible = visible_of(result.mesh, scene.visible);
+  plan_contacts(scene, result);
+  plan_cost(scene, with_visible, result);
+  result.cost.memory_bytes = peak_memory_bytes(result.cost, result.cost.factor_bytes);
+  return result;
+}
+
+}  // namespace
+
+model::Image Plan::image(const scene::Scene& scene) const {
+  model::Image image{};
+  model::Tissue& t = image.tissue;
+  const Candidates& c = candidates;
+  t.model = scene.tissue.model;
+  t.integration = scene.tissue.integration;
+  t.thickness_m = mesh.dimension() == 2 ? scene.tissue.thickness_m : 0.0;
+  t.edge_length_m = c.edge_length_m;
+  t.node_m = c.node_m;
+  t.node_flags = c.flags;
+  t.cell = c.cell;
+  t.ring_begin = c.ring.begin;
+  t.ring_cell = c.ring.entry;
+  t.material = c.material;
+  t.buckets = {.origin_m = c.buckets.origin_m,
+               .size_m = c.buckets.size_m,
+               .count = c.buckets.count,
+               .begin = c.buckets.cells.begin,
+               .cell = c.buckets.cells.entry};
+  image.law = &law;
+  image.needle = needle;
+  image.need = need;
+  return image;
+}
+
+std::size_t peak_memory_bytes(const Cost& cost, std::size_t factor_bytes) {
+  constexpr std::size_t around_each_unknown = 3000;  // mesh, stiffness twice, blocks of columns: measured
+  return factor_bytes + cost.unknowns * around_each_unknown + cost.columns * cost.columns * sizeof(double) + cost.image_bytes +
+         2 * cost.visible_bytes;
+}
+
+namespace {
+
+Plan plan_or_explain(const scene::Scene& scene, std::optional<fem::Mesh> mesh, WithVisible with_visible) {
+  try {
+    return plan_checked(scene, std::move(mesh), with_visible);
+  } catch (const fem::Error& error) {
+    throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+Plan plan(const scene::Scene& scene, WithVisible with_visible) { return plan_or_explain(scene, std::nullopt, with_visible); }
+Plan plan(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible) {
+  return plan_or_explain(scene, std::move(mesh), with_visible);
+}
+
+}  // namespace trocar::condense

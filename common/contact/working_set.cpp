@@ -1,0 +1,432 @@
+#include "common/contact/working_set.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace trocar::contact {
+namespace {
+
+constexpr double segment_regularisation = 1e-6;
+constexpr double point_regularisation = 1e-12;
+constexpr double resize_step = 1.0 / 128.0;  // of the spacing: how finely the last segment's weights follow the tip
+constexpr double soften_step = 1.0 / 512.0;  // and the softness of its tie
+constexpr int most_cells = 512;              // that one walk crosses
+
+Vector2 plus(const Vector2& a, const Vector2& b) noexcept { return {a[0] + b[0], a[1] + b[1]}; }
+Vector2 minus(const Vector2& a, const Vector2& b) noexcept { return {a[0] - b[0], a[1] - b[1]}; }
+Vector2 scaled(const Vector2& a, double factor) noexcept { return {a[0] * factor, a[1] * factor}; }
+double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
+double length(const Vector2& a) noexcept { return std::hypot(a[0], a[1]); }
+double overlap(double a0, double a1, double b0, double b1) noexcept { return std::max(0.0, std::min(a1, b1) - std::max(a0, b0)); }
+
+}  // namespace
+
+void WorkingSet::open(const model::Tissue& tissue, const Law& law) noexcept {
+  tissue_ = &tissue;
+  law_ = &law;
+  geometry_.open(tissue);
+  compliance_.open(tissue);
+  regularisation_ = law.method == Method::Embedded && law.explicit_count == 0 ? segment_regularisation : point_regularisation;
+  // A contact tied to supported nodes alone has no compliance of its own; 1 / (E t) is the tissue's scale.
+  const double depth = tissue.model == element::Model::Solid ? tissue.edge_length_m : tissue.thickness_m;
+  least_compliance_ = 1e-9 / (tissue.material.front().young_pa * depth);
+  clear();
+}
+
+void WorkingSet::clear() noexcept {
+  solver_.clear();
+  geometry_.restore();
+  compliance_.restore();
+  coupling_count_ = 0;
+  clock_ = 0;
+  tip_cell_ = -1;
+  tip_inside_ = false;
+  path_m_ = deepest_m_ = 0.0;
+  softened_ = capacity::contacts;
+}
+
+const WorkingSet::NodeCoupling& WorkingSet::coupling_of(std::uint32_t node) noexcept {
+  NodeCoupling* entry = nullptr;
+  for (std::size_t k = 0; k < coupling_count_ && entry == nullptr; ++k)
+    if (coupling_[k].node == node) entry = &coupling_[k];
+  if (entry == nullptr) {
+    if (coupling_count_ < nodes_in_use)
+      entry = &coupling_[coupling_count_++];
+    else
+      entry = std::min_element(coupling_.begin(), coupling_.end(), [](const auto& a, const auto& b) { return a.used < b.used; });
+    entry->node = node;
+    entry->known = 0;
+  }
+  entry->used = ++clock_;
+  const Embedding at = single_node(node);
+  for (; entry->known < size(); ++entry->known) entry->block[entry->known] = compliance_.coupling(at, point_[entry->known].at);
+  return *entry;
+}
+
+void WorkingSet::forget_couplings(std::size_t from_contact) noexcept {
+  for (std::size_t k = 0; k < coupling_count_; ++k) coupling_[k].known = std::min(coupling_[k].known, from_contact);
+}
+
+Vector2 WorkingSet::node_displacement(std::uint32_t node) noexcept {
+  const NodeCoupling& entry = coupling_of(node);
+  Vector2 u{};
+  for (std::size_t j = 0; j < size(); ++j) {
+    const Block& g = entry.block[j];
+    const Vector2& f = solver_.contact(j).force_n;
+    u[0] += g[0] * f[0] + g[1] * f[1];
+    u[1] += g[2] * f[0] + g[3] * f[1];
+  }
+  return u;
+}
+
+Vector2 WorkingSet::displacement_m(const Embedding& at) noexcept {
+  Vector2 u{};
+  for (std::uint32_t k = 0; k < at.count; ++k) u = plus(u, scaled(node_displacement(at.node[k]), at.weight[k]));
+  return u;
+}
+
+Vector2 WorkingSet::tied_displacement_m(std::size_t contact) noexcept {
+  Vector2 u{};
+  for (std::size_t j = 0; j < size(); ++j) {
+    const Block g = solver_.compliance(contact, j);
+    const Vector2& f = solver_.contact(j).force_n;
+    u = {u[0] + g[0] * f[0] + g[1] * f[1], u[1] + g[2] * f[0] + g[3] * f[1]};
+  }
+  return u;
+}
+
+// row_[0 … before]: the couplings of `at` with the contacts before it, and its own block.
+std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexcept {
+  std::fill_n(row_.begin(), before, Block{});
+  for (std::uint32_t k = 0; k < at.count; ++k) {
+    const NodeCoupling& entry = coupling_of(at.node[k]);
+    const double w = at.weight[k];
+    for (std::size_t j = 0; j < before; ++j)
+      for (std::size_t c = 0; c < 4; ++c) row_[j][c] += w * entry.block[j][c];
+  }
+  Block own = compliance_.coupling(at, at);
+  own[1] = own[2] = 0.5 * (own[1] + own[2]);
+  const double mean = 0.5 * (own[0] + own[3]);
+  const double added = std::max(regularisation_ * mean, mean < least_compliance_ ? least_compliance_ : 0.0);
+  own[0] += added;
+  own[3] += added;
+  row_[before] = last_own_ = own;
+  return before + 1;
+}
+
+void WorkingSet::push(const Point& point) noexcept {
+  const std::size_t i = size();
+  const std::size_t count = make_row(point.at, i);
+  point_[i] = point;
+  point_[i].material_m = geometry_.mean_m(point.at);
+  solver_.push({row_.data(), count});
+}
+
+void WorkingSet::pop() noexcept {
+  solver_.pop();
+  forget_couplings(size());
+  // What is the last one now was a whole segment: its tie is not softened.
+  if (size() > 0) last_own_ = solver_.compliance(size() - 1, size() - 1);
+}
+
+void WorkingSet::soften_last(const Vector2& tangent) noexcept {
+  if (law_->method != Method::Embedded || law_->explicit_count > 0) return;
+  const std::size_t i = size() - 1;
+  const double spacing = law_->spacing_m;
+  const double covered = path_m_ - point_[i].path_m;
+  if (softened_ != i || std::abs(covered - softened_length_m_) >= soften_step * spacing || covered >= spacing)
+    softened_length_m_ = std::clamp(covered, soften_step * spacing, spacing);
+  softened_ = i;
+  const double softness = 0.5 * (last_own_[0] + last_own_[3]) * (spacing / softened_length_m_ - 1.0);
+  const Vector2 n{-tangent[1], tangent[0]};
+  const Block own{last_own_[0] + softness * n[0] * n[0], last_own_[1] + softness * n[0] * n[1], last_own_[2] + softness * n[0] * n[1],
+                  last_own_[3] + softness * n[1] * n[1]};
+  solver_.replace_own(i, own);
+}
+
+bool WorkingSet::place(const Vector2& x_m) noexcept {
+  const std::int32_t cell = geometry_.locate(x_m, -1);
+  if (cell < 0 || size() == Solver::capacity) return false;
+  Point point;
+  point.at = geometry_.point(cell, x_m);
+  point.begin_m = x_m;
+  push(point);
+  point_[size() - 1].material_m = x_m;
+  solver_.start_from(size() - 1, State::Stuck);
+  return true;
+}
+
+void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept {
+  const std::size_t n = size();
+  if (law_->explicit_count > 0) {
+    for (std::size_t i = 0; i < n; ++i) {
+      target[i].upper_n = law_->explicit_slip_force_n[i];
+      target[i].lower_n = -target[i].upper_n;
+    }
+    return;
+  }
+  const double excess = std::max(0.0, tip_n_per_m - shaft_n_per_m);
+  const double zone_begins = deepest_m_ - law_->tip_zone_m;
+  const bool nodes = law_->method != Method::Embedded;
+  double begins = nodes ? 0.0 : point_[0].path_m;
+  for (std::size_t i = 0; i < n; ++i) {
+    double ends = path_m_;
+    if (i + 1 < n) ends = nodes ? 0.5 * (point_[i].path_m + point_[i + 1].path_m) : point_[i + 1].path_m;
+    const double threshold = shaft_n_per_m * std::max(0.0, ends - begins);
+    target[i].lower_n = -threshold;
+    target[i].upper_n = threshold + excess * overlap(begins, ends, zone_begins, path_m_);
+    begins = ends;
+  }
+}
+
+double WorkingSet::beyond_last() const noexcept {
+  const Point& last = point_[size() - 1];
+  return dot(last.direction, minus(tip_, last.begin_m));
+}
+
+// How far a line runs before it leaves the candidates.
+double WorkingSet::reach(const Vector2& from_m, std::int32_t cell, const Vector2& direction, double most_m,
+                         Trouble& trouble) const noexcept {
+  double distance = 0.0;
+  for (int step = 0; step < most_cells && distance < most_m; ++step) {
+    const Exit exit = geometry_.exit(cell, from_m, direction);
+    distance = std::max(distance, exit.distance);
+    const std::int32_t next = tissue_->cell[static_cast<std::size_t>(cell)].neighbour[exit.edge];
+    if (next < 0) {
+      if (next == model::limit && distance < most_m) trouble.left_candidates = true;
+      return std::min(distance, most_m);
+    }
+    cell = next;
+  }
+  return std::min(distance, most_m);
+}
+
+// The last segment's weights and tie for the length that it has now.
+void WorkingSet::resize_last(double length_m) noexcept {
+  const std::size_t i = size() - 1;
+  Point& last = point_[i];
+  const double spacing = law_->spacing_m;
+  // New tissue is cut where the tip goes; coming back, and going again, the segment keeps the course that was cut.
+  if (length_m > last.cut_m) {
+    const Vector2 chord = minus(tip_, last.begin_m);
+    last.heading = scaled(chord, 1.0 / dot(last.direction, chord));
+    last.cut_m = length_m;
+  }
+  const double now = std::clamp(length_m, resize_step * spacing / 2, spacing);
+  const bool grown_up = now == spacing && last.length_m != spacing;
+  if (std::abs(now - last.length_m) < resize_step * spacing && !grown_up) return;
+  const Vector2 end = plus(last.begin_m, scaled(last.heading, now));
+  last.at = geometry_.segment(last.begin_m, end, tip_cell_);
+  last.material_m = geometry_.mean_m(last.at);
+  last.length_m = now;
+  last.fresh = true;
+  forget_couplings(i);
+  solver_.replace(i, {row_.data(), make_row(last.at, i)});
+}
+
+void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept {
+  const double spacing = law_->spacing_m;
+  Point point;
+  point.begin_m = begin_m;
+  point.direction = point.heading = direction;
+  point.path_m = path_m;
+  point.length_m = resize_step * spacing / 2;
+  point.at = geometry_.segment(begin_m, plus(begin_m, scaled(direction, point.length_m)), tip_cell_);
+  push(point);
+}
+
+void WorkingSet::push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction,
+                           Trouble& trouble) noexcept {
+  const std::uint32_t a = cell.node[edge];
+  const std::uint32_t b = cell.node[(edge + 1) % cell.count];
+  const std::uint32_t node = length(minus(crossing_m, geometry_.node_m(a))) <= length(minus(crossing_m, geometry_.node_m(b))) ? a : b;
+  for (std::size_t i = 0; i < size(); ++i)
+    if (point_[i].at.node[0] == node) return;
+  // A supported node cannot give way.
+  if ((tissue_->node_flags[node] & (model::fixed_x | model::fixed_y)) != 0) return;
+  if (size() == Solver::capacity) {
+    trouble.full = true;
+    return;
+  }
+  if (law_->method == Method::Adapt && !geometry_.is_moved(node) &&
+      length(minus(crossing_m, geometry_.node_m(node))) > 1e-9 * tissue_->edge_length_m) {
+    if (compliance_.move(geometry_, node, crossing_m)) {
+      forget_couplings(0);
+      for (std::size_t i = 0; i < size(); ++i) {
+        for (std::size_t j = 0; j <= i; ++j) {
+          const Block change = compliance_.latest_change(point_[i].at.node[0], point_[j].at.node[0]);
+          row_[j] = solver_.compliance(i, j);
+          for (std::size_t k = 0; k < 4; ++k) row_[j][k] -= change[k];
+        }
+        solver_.replace(i, {row_.data(), i + 1});
+      }
+    } else {
+      trouble.not_adapted = true;
+    }
+  }
+  Point point;
+  point.at = single_node(node);
+  point.begin_m = crossing_m;
+  point.direction = direction;
+  point.path_m = size() == 0 ? 0.0
+                             : point_[size() - 1].path_m +
+                                   std::max(0.0, dot(point_[size() - 1].direction, minus(crossing_m, point_[size() - 1].begin_m)));
+  push(point);
+}
+
+// From one point of the path to a later one, with a contact at each edge that it crosses.
+void WorkingSet::walk(Vector2 from_m, std::int32_t cell, const Vector2& to_m, const Vector2& direction, Trouble& trouble) noexcept {
+  for (int step = 0; step < most_cells; ++step) {
+    const Vector2 way = minus(to_m, from_m);
+    const double rest = length(way);
+    if (rest == 0.0) break;
+    const Vector2 heading = scaled(way, 1.0 / rest);
+    const Exit exit = geometry_.exit(cell, from_m, heading);
+    if (!(exit.distance <= rest)) break;
+    const model::Cell& crossed = tissue_->cell[static_cast<std::size_t>(cell)];
+    const Vector2 crossing = plus(from_m, scaled(heading, exit.distance));
+    const std::int32_t next = crossed.neighbour[exit.edge];
+    push_node(crossing, crossed, exit.edge, direction, trouble);
+    if (next < 0) {
+      trouble.left_candidates = trouble.left_candidates || next == model::limit;
+      break;
+    }
+    from_m = crossing;
+    cell = next;
+  }
+}
+
+WorkingSet::Trouble WorkingSet::enter(const Vector2& tip_m, const Vector2& direction, double most_m) noexcept {
+  Trouble trouble;
+  const std::int32_t cell = geometry_.locate(tip_m, -1);
+  if (cell < 0) return trouble;
+  const Vector2 back = scaled(direction, -1.0);
+  const double depth = reach(tip_m, cell, back, most_m, trouble);
+  if (trouble.left_candidates) return trouble;
+  tip_ = tip_m;
+  tip_cell_ = cell;
+  tip_inside_ = true;
+  deepest_m_ = 0.0;
+  const Vector2 entry = plus(tip_m, scaled(back, depth));
+  std::int32_t entry_cell = geometry_.locate(entry, -1);
+  if (entry_cell < 0) entry_cell = cell;
+  if (law_->method == Method::Embedded) {
+    push_segment(entry, direction, 0.0);
+    follow_segments(direction, trouble);
+  } else {
+    const Exit behind = geometry_.exit(entry_cell, entry, back);
+    push_node(entry, tissue_->cell[static_cast<std::size_t>(entry_cell)], behind.edge, direction, trouble);
+    if (size() == 0) return trouble;
+    walk(entry, entry_cell, tip_m, direction, trouble);
+    path_m_ = point_[size() - 1].path_m + std::max(0.0, beyond_last());
+  }
+  deepest_m_ = path_m_;
+  return trouble;
+}
+
+// Newton on X + u(X) = tip from the last X, with the gradient of the cell in which X lies.
+void WorkingSet::find_tip(const Vector2& tip_m, Trouble& trouble) noexcept {
+  constexpr int most_iterations = 30;
+  const double tolerance_m = 1e-9 * tissue_->edge_length_m;
+  std::array<Vector2, 4> nodes{};
+  std::int32_t loaded = -1;
+  for (int k = 0; k < most_iterations; ++k) {
+    const std::int32_t found = geometry_.locate(tip_, tip_cell_);
+    tip_inside_ = found >= 0;
+    if (tip_inside_) tip_cell_ = found;
+    const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(tip_cell_)];
+    if (loaded != tip_cell_)
+      for (std::size_t p = 0; p < cell.count; ++p) nodes[p] = node_displacement(cell.node[p]);
+    loaded = tip_cell_;
+    const CellShape at = geometry_.shape(tip_cell_, tip_);
+    Vector2 rest = minus(tip_m, tip_);
+    Block j{1.0, 0.0, 0.0, 1.0};
+    for (std::size_t p = 0; p < at.count; ++p) {
+      rest = minus(rest, scaled(nodes[p], at.weight[p]));
+      for (std::size_t a = 0; a < 2; ++a)
+        for (std::size_t b = 0; b < 2; ++b) j[2 * a + b] += nodes[p][a] * at.gradient[p][b];
+    }
+    if (std::abs(rest[0]) + std::abs(rest[1]) < tolerance_m) return;
+    const double determinant = j[0] * j[3] - j[1] * j[2];
+    // Tissue that linear elasticity has turned inside out has no meaningful gradient.
+    const Vector2 step = determinant > 0.05
+                             ? Vector2{(j[3] * rest[0] - j[1] * rest[1]) / determinant, (j[0] * rest[1] - j[2] * rest[0]) / determinant}
+                             : rest;
+    const double size_m = length(step);
+    if (!(size_m < 1e6)) break;
+    tip_ = plus(tip_, scaled(step, size_m > tissue_->edge_length_m ? tissue_->edge_length_m / size_m : 1.0));
+  }
+  // Tissue torn out of all proportion by a jump of the base: what the tip left is dropped.
+  tip_ = tip_m;
+  const std::int32_t found = geometry_.locate(tip_, tip_cell_);
+  tip_inside_ = found >= 0;
+  if (tip_inside_) tip_cell_ = found;
+  trouble.tip_lost = true;
+}
+
+void WorkingSet::follow_segments(const Vector2& direction, Trouble& trouble) noexcept {
+  const double spacing = law_->spacing_m;
+  double beyond = beyond_last();
+  // Outside of the tissue the path ends where it leaves it.
+  const auto clipped = [&] {
+    if (tip_inside_ || beyond <= 0.0) return beyond;
+    const Point& last = point_[size() - 1];
+    const std::int32_t cell = geometry_.locate(last.begin_m, tip_cell_);
+    return cell < 0 ? 0.0 : std::min(beyond, reach(last.begin_m, cell, last.direction, beyond, trouble));
+  };
+  double covered = clipped();
+  while (covered >= spacing) {
+    Point& last = point_[size() - 1];
+    resize_last(spacing);
+    if (size() == Solver::capacity) {
+      trouble.full = true;
+      break;
+    }
+    const Vector2 next = plus(last.begin_m, scaled(last.heading, spacing));
+    if (geometry_.locate(next, tip_cell_) < 0) break;
+    push_segment(next, direction, last.path_m + spacing);
+    beyond = beyond_last();
+    covered = clipped();
+  }
+  while (size() > 0 && beyond <= 0.0) {
+    pop();
+    if (size() > 0) beyond = beyond_last();
+  }
+  if (size() == 0) return;
+  covered = std::clamp(clipped(), 0.0, spacing);
+  resize_last(covered);
+  path_m_ = point_[size() - 1].path_m + covered;
+}
+
+void WorkingSet::follow_nodes(const Vector2& before_m, std::int32_t cell, const Vector2& direction, Trouble& trouble) noexcept {
+  while (size() > 0 && beyond_last() < 0.0) pop();
+  if (size() == 0) return;
+  if (dot(minus(tip_, before_m), point_[size() - 1].direction) > 0.0) walk(before_m, cell, tip_, direction, trouble);
+  double beyond = std::max(0.0, beyond_last());
+  if (!tip_inside_) {
+    const Point& last = point_[size() - 1];
+    const std::int32_t from = geometry_.locate(last.begin_m, tip_cell_);
+    beyond = from < 0 ? 0.0 : reach(last.begin_m, from, last.direction, beyond, trouble);
+  }
+  path_m_ = point_[size() - 1].path_m + beyond;
+}
+
+WorkingSet::Trouble WorkingSet::follow(const Vector2& tip_m, const Vector2& direction) noexcept {
+  Trouble trouble;
+  if (size() == 0) return trouble;
+  const Vector2 before = tip_;
+  const std::int32_t cell = tip_cell_;
+  const bool was_inside = tip_inside_;
+  find_tip(tip_m, trouble);
+  if (law_->method == Method::Embedded)
+    follow_segments(direction, trouble);
+  else
+    follow_nodes(was_inside ? before : tip_, cell, direction, trouble);
+  if (size() == 0)
+    clear();
+  else
+    deepest_m_ = std::max(deepest_m_, path_m_);
+  return trouble;
+}
+
+}  // namespace trocar::contact

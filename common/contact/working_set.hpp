@@ -1,0 +1,141 @@
+// The contacts between needle and tissue as the needle moves: where they are, how they are coupled, which force each may carry.
+//
+// Path. The tip's own place X in the reference mesh solves X + u(X) = tip. While X moves on into new tissue the path grows, and while it
+// comes back the path shrinks; complete withdrawal forgets it. Lengths along the path are material lengths.
+//   Embedded: the path is cut into segments of law.spacing_m; contact j is the mean over segment j (a constant force density along it,
+//     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of a
+//     thirty-second of the spacing. While it is short its tie is softened by its own compliance times (spacing / length - 1), so that
+//     beginning or leaving it does not kick.
+//   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
+//   in the
+//     reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the tip.
+//   Explicit: points given by the scene, none added or removed.
+// Thresholds: the density times the length that a contact carries, so their sum is the density times the path. Over the last tip_zone_m of
+// the path ever cut the tip's density replaces the shaft's, in the upper bound alone: only while new tissue is cut. Regularisation: 1e-6
+// (explicit and node contacts: 1e-12) of a contact's own compliance is added to it.
+//
+// Fixed size, no allocation. Cost: a tick that keeps its contacts and cells, O(s); a new contact or cell, O(s) with the embeddings'
+// sizes; a moved node, O(s p) with the moves before it. Never the size of the mesh.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/contact/compliance.hpp"
+#include "common/contact/geometry.hpp"
+#include "common/contact/solver.hpp"
+#include "common/core/capacities.hpp"
+#include "common/model/law.hpp"
+#include "common/model/tissue.hpp"
+
+namespace trocar::contact {
+
+class WorkingSet {
+ public:
+  struct Point {
+    Embedding at{};
+    Vector2 material_m{};  // mean position in the reference mesh
+    Vector2 begin_m{};     // of the segment; of a node contact: where the path crosses
+    Vector2 direction{};   // of the path there, unit
+    double path_m{};       // length of the path up to begin_m
+    double arclength_m{};  // where it is anchored on the needle, from the base; the needle's owner keeps it
+    double length_m{};     // embedded: that its weights stand for
+    Vector2 heading{};     // embedded: course of the cut per length along direction
+    double cut_m{};        // embedded: how far it was ever cut
+    bool fresh{true};      // anchor it where it now is
+  };
+  // What could not be done in the last call; each leaves a consistent working set.
+  struct Trouble {
+    bool full{};             // a contact is missing for want of capacity
+    bool left_candidates{};  // the path runs on where the image has no candidates
+    bool tip_lost{};         // the search for the tip's material point did not converge: it counts as where it is in space
+    bool not_adapted{};      // a node could not be moved and was pulled instead
+  };
+
+  // Both must outlive this object; the image reader has checked them.
+  void open(const model::Tissue& tissue, const Law& law) noexcept;
+  void clear() noexcept;
+
+  [[nodiscard]] std::size_t size() const noexcept { return solver_.size(); }
+  [[nodiscard]] const Point& point(std::size_t i) const noexcept { return point_[i]; }
+  [[nodiscard]] Point& point(std::size_t i) noexcept { return point_[i]; }
+  [[nodiscard]] Solver& solver() noexcept { return solver_; }
+  [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+  [[nodiscard]] const Geometry& geometry() const noexcept { return geometry_; }
+  [[nodiscard]] Compliance& compliance() noexcept { return compliance_; }
+  [[nodiscard]] double path_m() const noexcept { return path_m_; }        // from entry to tip
+  [[nodiscard]] double deepest_m() const noexcept { return deepest_m_; }  // longest path since the last complete withdrawal
+  [[nodiscard]] Vector2 tip_material_m() const noexcept { return tip_; }
+
+  // An explicit contact; false outside of the candidates or without capacity.
+  [[nodiscard]] bool place(const Vector2& x_m) noexcept;
+
+  // Upper and lower bounds of every contact's axial force from the two densities.
+  void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept;
+
+  [[nodiscard]] bool in_tissue(const Vector2& x_m) const noexcept { return geometry_.locate(x_m, -1) >= 0; }
+  // Turns the soft tie of the last segment into the frame of this tick. Before every solve.
+  void soften_last(const Vector2& tangent) noexcept;
+
+  // First contact of a needle whose tip stands in undeformed tissue; the path begins where its straight shaft crosses the surface, at most
+  // `most_m` behind the tip.
+  Trouble enter(const Vector2& tip_m, const Vector2& direction, double most_m) noexcept;
+  // After a solve: finds the tip's material point and lets the path grow or shrink with it.
+  Trouble follow(const Vector2& tip_m, const Vector2& direction) noexcept;
+
+  // Displacement that the present forces cause, m. O(s) for points that are tied to nodes in use.
+  [[nodiscard]] Vector2 displacement_m(const Embedding& at) noexcept;
+  // Of a contact as its solve sees it: with the softness and the regularisation of its tie.
+  [[nodiscard]] Vector2 tied_displacement_m(std::size_t contact) noexcept;
+
+ private:
+  struct NodeCoupling {  // displacement of a node per unit force at each contact
+    std::uint32_t node{};
+    std::size_t known{};
+    std::uint64_t used{};
+    std::array<Block, capacity::contacts> block{};
+  };
+  static constexpr std::size_t nodes_in_use = 48;
+
+  const NodeCoupling& coupling_of(std::uint32_t node) noexcept;
+  void forget_couplings(std::size_t from_contact) noexcept;
+  [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
+  std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
+  void push(const Point& point) noexcept;
+  void pop() noexcept;
+  void resize_last(double length_m) noexcept;
+  void push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept;
+  void push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction, Trouble& trouble) noexcept;
+  void find_tip(const Vector2& tip_m, Trouble& trouble) noexcept;
+  void follow_segments(const Vector2& direction, Trouble& trouble) noexcept;
+  void follow_nodes(const Vector2& before_m, std::int32_t cell, const Vector2& direction, Trouble& trouble) noexcept;
+  void walk(Vector2 from_m, std::int32_t cell, const Vector2& to_m, const Vector2& direction, Trouble& trouble) noexcept;
+  [[nodiscard]] double reach(const Vector2& from_m, std::int32_t cell, const Vector2& direction, double most_m,
+                             Trouble& trouble) const noexcept;
+  [[nodiscard]] double beyond_last() const noexcept;
+
+  const model::Tissue* tissue_{nullptr};
+  const Law* law_{nullptr};
+  double regularisation_{};
+  double least_compliance_{};
+  Geometry geometry_{};
+  Compliance compliance_{};
+  Solver solver_{};
+  std::array<Point, capacity::contacts> point_{};
+  std::array<Block, capacity::contacts> row_{};
+  Block last_own_{};            // of the last contact, without the softness of its tie
+  std::size_t softened_{};      // the contact and
+  double softened_length_m_{};  // the length that the softness is for
+  std::array<NodeCoupling, nodes_in_use> coupling_{};
+  std::size_t coupling_count_{0};
+  std::uint64_t clock_{0};
+  Vector2 tip_{};
+  std::int32_t tip_cell_{-1};  // the last cell that held the tip
+  bool tip_inside_{false};
+  double path_m_{0.0};
+  double deepest_m_{0.0};
+};
+
+}  // namespace trocar::contact

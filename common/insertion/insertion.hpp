@@ -1,0 +1,111 @@
+// The step of a rigid needle: base pose in, base wrench out. Tissue and contacts are solved in one go, to a residual.
+//
+//   Pose of the base in the rig frame, theta from base to tip; t = (cos theta, sin theta). Contact i: material point X_i, displacement u_i,
+//   anchored at arclength s_i. Its target is d_i = b + s_i t - X_i; contact/solver.hpp solves for the forces f_i of the needle on the
+//   tissue; a contact that slipped is anchored anew: s_i <- s_i - ds_i. Then the tip is followed (contact/working_set.hpp). base wrench =
+//   what the base applies to the needle = sum f_i, sum (X_i + u_i - b) x f_i: right-handed about the base point (MODELS 8).
+// Skips, none of which changes a result: needle outside of the tissue, no contact solve; no state, frame or geometry changed, the
+// factor is used again (solver.hpp); nothing changed at all, the last forces stay.
+// One step is a pure function of (state, pose, dt): no allocation, lock, system call, exception; bounded time whatever the mesh.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "common/contact/density.hpp"
+#include "common/contact/working_set.hpp"
+#include "common/core/capacities.hpp"
+#include "common/model/image.hpp"
+
+namespace trocar::insertion {
+
+using contact::Vector2;
+
+struct Pose {
+  double x_m{};
+  double y_m{};
+  double theta_rad{};
+};
+
+struct Wrench {  // what the base applies to the needle
+  double fx_n{};
+  double fy_n{};
+  double tau_nm{};  // about the base point
+};
+
+// In order of severity: a step reports the first that applies.
+enum class Status : std::uint8_t {
+  Ok,
+  NotAdapted,       // a node could not be moved onto the needle and was pulled instead
+  CapacityReached,  // a contact is missing: more would be needed than capacity::contacts
+  LeftCandidates,   // the path runs where the image has no candidates; what lies there carries no force
+  TipLost,          // the tip's material point was not found: tissue torn out of all proportion by a jump of the base
+  IllConditioned,   // the residual stays above the tolerance
+  PivotLimit,       // the bound on pivots was hit; forces within their bounds
+  OffShaft,         // an explicit contact does not lie on the shaft at the first step: nothing is computed
+  NotFinite,        // pose or time step refused; the last result stays
+};
+[[nodiscard]] const char* to_string(Status status) noexcept;
+
+struct Result {
+  Status status{Status::Ok};
+  Wrench base{};
+  Pose tip{};
+  std::uint32_t contacts{};
+  std::int32_t pivots{};
+  std::int32_t iterations{};
+  std::int32_t rows_factored{};
+  double residual_n{};
+  double path_m{};  // length of the path in the tissue, entry to tip
+};
+
+class Insertion {
+ public:
+  static constexpr double speed_filter_s = 0.020;             // low-pass of the speed along the shaft, for the velocity law
+  static constexpr double explicit_point_tolerance_m = 1e-9;  // across the shaft, at the first step
+
+  // Starts afresh with this model, which must outlive its use here and come from model::open.
+  void open(const model::Image& image) noexcept;
+  // Forgets contacts, path and speed.
+  void reset() noexcept;
+
+  // dt_s since the last step serves the speed alone; ignored in the first step.
+  Result step(const Pose& base, double dt_s) noexcept;
+
+  struct ContactReport {
+    Vector2 position_m{};  // deformed
+    double arclength_m{};
+    double axial_n{};  // of the needle on the tissue
+    double lateral_n{};
+    contact::State state{};
+  };
+  [[nodiscard]] std::size_t contacts() const noexcept { return set_.size(); }
+  [[nodiscard]] ContactReport contact(std::size_t i) const noexcept;
+  [[nodiscard]] const contact::WorkingSet& working_set() const noexcept { return set_; }
+  [[nodiscard]] contact::WorkingSet& working_set() noexcept { return set_; }
+  [[nodiscard]] double speed_m_s() const noexcept { return speed_m_s_; }  // along the shaft, filtered
+  [[nodiscard]] double shaft_n_per_m() const noexcept { return shaft_n_per_m_; }
+
+  // For tests and benchmarks: every step computes everything again. Changes no result.
+  void skip(bool enabled) noexcept { skip_ = enabled; }
+
+ private:
+  bool place_explicit() noexcept;
+  void anchor_fresh() noexcept;
+  [[nodiscard]] Wrench base_wrench() const noexcept;
+
+  const model::Image* image_{nullptr};
+  contact::WorkingSet set_{};
+  contact::Density density_{};
+  std::array<contact::Target, capacity::contacts> target_{};
+  bool skip_{true};
+  bool started_{false};
+  Pose pose_{};
+  Vector2 axis_{1.0, 0.0};
+  double speed_m_s_{};
+  double shaft_n_per_m_{}, tip_n_per_m_{};
+  Result result_{};
+};
+
+}  // namespace trocar::insertion
