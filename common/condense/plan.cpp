@@ -6,8 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "common/config/user_error.hpp"
+#include "common/condense/naming_the_file.hpp"
 #include "common/core/capacities.hpp"
+#include "common/fem/assembly.hpp"
+#include "common/fem/statics.hpp"
 
 namespace trocar::condense {
 namespace {
@@ -194,12 +196,17 @@ std::size_t peak_memory_bytes(const Cost& cost, std::size_t factor_bytes) {
          2 * cost.visible_bytes;
 }
 
+fem::Mesh check_tissue(const scene::Scene& scene) {
+  return naming_the_file(scene, [&] {
+    fem::Mesh mesh = fem::make_mesh(scene.tissue);
+    (void)fem::supported_degrees_of_freedom(mesh, scene.tissue.supports);
+    (void)fem::assemble_stiffness(mesh, scene.tissue);
+    return mesh;
+  });
+}
+
 Plan plan(const scene::Scene& scene, WithVisible with_visible) {
-  try {
-    return plan_checked(scene, with_visible);
-  } catch (const fem::Error& error) {
-    throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
-  }
+  return naming_the_file(scene, [&] { return plan_checked(scene, with_visible); });
 }
 
 }  // namespace trocar::condense
