@@ -214,7 +214,11 @@ void Factor::solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, 
         for (Eigen::Index i = 0; i < n; ++i) result.row(i) = x.row(l_->place[static_cast<std::size_t>(i)]);
         const std::lock_guard lock(guard);
         if (failure) return;
-        sink(first, result);
+        try {  // here, while nobody else can call the sink
+          sink(first, result);
+        } catch (...) {
+          failure = std::current_exception();
+        }
       }
     } catch (...) {
       const std::lock_guard lock(guard);

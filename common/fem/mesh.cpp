@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/fem/gmsh.hpp"
+
 namespace trocar::fem {
 namespace {
 
@@ -138,10 +140,7 @@ Mesh structured_grid(const Grid& grid) {
   return mesh;
 }
 
-Mesh make_mesh(const Tissue& tissue) {
-  if (!tissue.grid) throw Error("the tissue has no grid");
-  return structured_grid(*tissue.grid);
-}
+Mesh make_mesh(const Tissue& tissue) { return tissue.grid ? structured_grid(*tissue.grid) : read_gmsh(tissue.mesh_file); }
 
 Box bounding_box(const Mesh& mesh) {
   if (mesh.node.empty()) throw Error("the mesh has no nodes");
