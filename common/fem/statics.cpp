@@ -50,8 +50,9 @@ void Statics::solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::I
   Eigen::MatrixXd displacement;
   const auto expand = [&](Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& x) {
     displacement.setZero(degrees_of_freedom(), x.cols());
-    for (Eigen::Index i = 0; i < displacement.rows(); ++i)
-      if (!supported(i)) displacement.row(i) = x.row(equations_.row[static_cast<std::size_t>(i)]);
+    for (Eigen::Index c = 0; c < x.cols(); ++c)  // column by column, as they lie in memory
+      for (Eigen::Index i = 0; i < displacement.rows(); ++i)
+        if (!supported(i)) displacement(i, c) = x(equations_.row[static_cast<std::size_t>(i)], c);
     sink(first, displacement);
   };
   if (equations_.count() > 0) return factor_->solve_columns(right, block, expand);
