@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/condense/float32_error.hpp"
-#include "common/config/user_error.hpp"
+#include "common/condense/naming_the_file.hpp"
 #include "common/fem/statics.hpp"
 
 namespace trocar::condense {
@@ -134,11 +134,7 @@ Compiled compile_checked(const scene::Scene& scene, const Plan& plan, const Opti
 }  // namespace
 
 Compiled compile(const scene::Scene& scene, const Plan& plan, const Options& options) {
-  try {
-    return compile_checked(scene, plan, options);
-  } catch (const fem::Error& error) {
-    throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
-  }
+  return naming_the_file(scene, [&] { return compile_checked(scene, plan, options); });
 }
 
 Compiled compile_to_memory(const scene::Scene& scene, const Options& options) {

@@ -14,9 +14,9 @@
 
 #include "common/condense/compile.hpp"
 #include "common/config/csv.hpp"
+#include "common/config/new_file.hpp"
 #include "common/config/user_error.hpp"
 #include "common/fem/subdivide.hpp"
-#include "common/image_file/pending_file.hpp"
 #include "common/insertion/insertion.hpp"
 #include "common/scene/scene.hpp"
 
@@ -181,26 +181,24 @@ std::string off_shaft(const scene::Scene& scene, const Pose& base) {
 
 class Lines {
  public:
-  explicit Lines(const std::filesystem::path& file, std::string_view header) : file_(file) { text_ = fmt::format("{}\n", header); }
+  Lines(const std::filesystem::path& file, std::string_view header) : file_(file) { text_ = fmt::format("{}\n", header); }
   template <typename... T>
   void add(fmt::format_string<T...> format, T&&... values) {
     fmt::format_to(std::back_inserter(text_), format, std::forward<T>(values)...);
-    if (text_.size() < flush_at) return;
-    flush();
+    if (text_.size() >= flush_at) flush();
   }
-  void sync() {
+  void finish() {
     flush();
-    file_.sync();
+    file_.keep();
   }
-  void commit() { file_.commit(); }
 
  private:
   static constexpr std::size_t flush_at = std::size_t{1} << 16U;
   void flush() {
-    file_.write(std::as_bytes(std::span(text_)));
+    file_.stream() << text_;
     text_.clear();
   }
-  image_file::PendingFile file_;
+  config::NewFile file_;
   std::string text_;
 };
 
@@ -252,10 +250,8 @@ int run_insert(const InsertOptions& options) {
                     c.lateral_n, name_of(c.state));
     }
   }
-  rows.sync();
-  if (contacts) contacts->sync();
-  rows.commit();
-  if (contacts) contacts->commit();
+  if (contacts) contacts->finish();
+  rows.finish();
 
   for (const auto& [status, count] : trouble)
     fmt::print(stderr, "trocar: warning: {} of {} rows, first at t_s = {}: {}\n", count.first, path.size(), count.second,

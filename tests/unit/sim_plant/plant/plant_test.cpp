@@ -85,7 +85,7 @@ TEST(Plant, SensorTurnsWithTheNeedle) {
   for (const double angle : {0.0, 0.7}) {
     rig::Rig rig = shipped_rig();
     rig.sensor.angle_rad = angle;
-    Plant plant(rig, perfect(), shipped_phantom(), 1);
+    Plant plant(rig, perfect(), shipped_scene(), 1);
     // A hand pushes the needle sideways into the tissue: the base carries what the phantom answers.
     plant.set_hand_wrench({0.3, 3.0, 0.002});
     plant.advance_to(300 * millisecond, {});
@@ -134,11 +134,11 @@ std::array<double, 3> insertion(double time_s) { return {0.0, 0.11 + 0.008 * tim
 TEST(Plant, InsertionLoadsMotorsSensorAndMechanismAlike) {
   Machine m;
   m.follow(5.0, insertion);
-  const double path = m.plant.phantom().path_m();
+  const double path = m.plant.phantom().insertion().working_set().path_m();
   EXPECT_GT(path, 0.025);
   EXPECT_LT(path, 0.036);
   const double base = m.plant.base_wrench()[1];
-  EXPECT_NEAR(base, m.plant.phantom().shaft_density_n_per_m() * path, 0.05);
+  EXPECT_NEAR(base, m.plant.phantom().insertion().shaft_n_per_m() * path, 0.05);
   EXPECT_NEAR(m.plant.sensor_wrench()[0], base, 5 * 0.0125);  // along the needle
   EXPECT_NEAR(m.plant.velocity()[1], 0.008, 0.002);
   EXPECT_EQ(m.plant.phantom().counters().unconverged, 0u);
@@ -234,7 +234,7 @@ TEST(Plant, SurvivesFullTorqueInEveryDirection) {
 
 std::string refusal(const rig::Rig& rig, const PlantConfig& config) {
   try {
-    const Plant plant(rig, config, shipped_phantom(), 1);
+    const Plant plant(rig, config, shipped_scene(), 1);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
