@@ -37,10 +37,10 @@ methods = 'ours thesis full_refactored full_reused_columns full_reused_iteration
 plot for [m in methods] csv skip 1 using (strcol(1) eq 'turn_to_and_fro' && strcol(2) eq m ? ($3 < 1e-17 ? 1e-17 : $3) : NaN):5 with points pt 7 ps 1.5 title m noenhanced
 
 set output folder.'/contact_size.svg'
-set title 'Cost of a tick against the size of the mesh, 14 contacts, the needle turns'
+set title 'Cost of a tick against the size of the mesh, 14 contacts (whole step: 32), the needle turns'
 set xlabel 'nodes of the mesh'
 csv = folder.'/contact.csv'
-methods = 'ours thesis full_displacement full_reused_columns full_reused_iterations full_refactored'
+methods = 'ours our_whole_step thesis full_displacement full_reused_columns full_reused_iterations full_refactored'
 plot for [m in methods] csv skip 1 using (strcol(1) eq 'mesh_size' && strcol(2) eq m ? $4 : NaN):5 with points pt 7 title m noenhanced
 )";
 
