@@ -1,6 +1,7 @@
 #include "common/condense/plan.hpp"
 
 #include <fmt/format.h>
+#include <optional>
 
 #include <algorithm>
 #include <cmath>
@@ -110,7 +111,10 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
   plan.law = *scene.contact;
   const double reach = reach_m(c, scene.needle->length_m);
   const bool given = plan.law.spacing_m > 0.0;
-  if (!given) plan.law.spacing_m = std::max(c.edge_length_m, reach / static_cast<double>(capacity::contacts));
+  // One force per edge alternates along the path: the edges' averages hardly feel such a load (inf-sup). 1.5 edges keep it off, 2 cost
+  // detail.
+  constexpr double edges_per_segment = 1.5;
+  if (!given) plan.law.spacing_m = std::max(edges_per_segment * c.edge_length_m, reach / static_cast<double>(capacity::contacts));
   if (plan.law.explicit_count > capacity::contacts)
     throw fem::Error(
         fmt::format("contact.points_m has {} contacts and the capacity is {}; give fewer", plan.law.explicit_count, capacity::contacts));
@@ -149,8 +153,8 @@ void plan_cost(const scene::Scene& scene, WithVisible with_visible, Plan& plan) 
   cost.factor_bytes = factor_estimate(static_cast<double>(cost.unknowns), mesh.dimension());
 }
 
-Plan plan_checked(const scene::Scene& scene, WithVisible with_visible) {
-  fem::Mesh mesh = fem::make_mesh(scene.tissue);
+Plan plan_checked(const scene::Scene& scene, std::optional<fem::Mesh> given, WithVisible with_visible) {
+  fem::Mesh mesh = given ? std::move(*given) : fem::make_mesh(scene.tissue);
   check_method(scene, mesh.dimension() == 3);
   Candidates candidates = candidates_of(mesh, scene);
   Plan result{.mesh = std::move(mesh), .candidates = std::move(candidates)};
@@ -206,7 +210,11 @@ fem::Mesh check_tissue(const scene::Scene& scene) {
 }
 
 Plan plan(const scene::Scene& scene, WithVisible with_visible) {
-  return naming_the_file(scene, [&] { return plan_checked(scene, with_visible); });
+  return naming_the_file(scene, [&] { return plan_checked(scene, std::nullopt, with_visible); });
+}
+
+Plan plan(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible) {
+  return naming_the_file(scene, [&] { return plan_checked(scene, std::move(mesh), with_visible); });
 }
 
 }  // namespace trocar::condense

@@ -53,5 +53,7 @@ enum class WithVisible { No, Yes };
 // Throws config::UserError that begins with the scene's file: everything that candidates_of() throws, no needle or contact, a needle that
 // is not rigid, a method that images cannot hold, explicit contacts outside of the candidates, a capacity exceeded.
 [[nodiscard]] Plan plan(const scene::Scene& scene, WithVisible with_visible = WithVisible::Yes);
+// With this mesh in place of the scene's own (subdivided along a path, say).
+[[nodiscard]] Plan plan(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible = WithVisible::Yes);
 
 }  // namespace trocar::condense

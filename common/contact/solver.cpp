@@ -386,6 +386,16 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     evaluate();
     judge(target, v);
   }
+  if (!std::isfinite(v.residual_n)) {
+    // Nothing that is no number may reach the next tick.
+    for (std::size_t i = 0; i < size_; ++i) {
+      contact_[i].axial_n = contact_[i].lateral_n = 0.0;
+      contact_[i].force_n = {};
+      force_[2 * i] = force_[2 * i + 1] = 0.0;
+    }
+    evaluated_ = false;
+    evaluate();
+  }
   solution.residual_n = v.residual_n;
   if (!(v.residual_n <= tolerance_n)) solution.status = limited ? SolverStatus::PivotLimit : SolverStatus::IllConditioned;
   return solution;

@@ -8,8 +8,9 @@ namespace {
 
 constexpr double segment_regularisation = 1e-6;
 constexpr double point_regularisation = 1e-12;
-constexpr double resize_step = 1.0 / 16.0;  // of the spacing
-constexpr int most_cells = 512;             // that one walk crosses
+constexpr double resize_step = 1.0 / 128.0;  // of the spacing: how finely the last segment's weights follow the tip
+constexpr double soften_step = 1.0 / 512.0;  // and the softness of its tie
+constexpr int most_cells = 512;              // that one walk crosses
 
 Vector2 plus(const Vector2& a, const Vector2& b) noexcept { return {a[0] + b[0], a[1] + b[1]}; }
 Vector2 minus(const Vector2& a, const Vector2& b) noexcept { return {a[0] - b[0], a[1] - b[1]}; }
@@ -41,6 +42,7 @@ void WorkingSet::clear() noexcept {
   tip_cell_ = -1;
   tip_inside_ = false;
   path_m_ = deepest_m_ = 0.0;
+  softened_ = capacity::contacts;
 }
 
 const WorkingSet::NodeCoupling& WorkingSet::coupling_of(std::uint32_t node) noexcept {
@@ -130,7 +132,12 @@ void WorkingSet::pop() noexcept {
 void WorkingSet::soften_last(const Vector2& tangent) noexcept {
   if (law_->method != Method::Embedded || law_->explicit_count > 0) return;
   const std::size_t i = size() - 1;
-  const double softness = 0.5 * (last_own_[0] + last_own_[3]) * (law_->spacing_m / point_[i].length_m - 1.0);
+  const double spacing = law_->spacing_m;
+  const double covered = path_m_ - point_[i].path_m;
+  if (softened_ != i || std::abs(covered - softened_length_m_) >= soften_step * spacing || covered >= spacing)
+    softened_length_m_ = std::clamp(covered, soften_step * spacing, spacing);
+  softened_ = i;
+  const double softness = 0.5 * (last_own_[0] + last_own_[3]) * (spacing / softened_length_m_ - 1.0);
   const Vector2 n{-tangent[1], tangent[0]};
   const Block own{last_own_[0] + softness * n[0] * n[0], last_own_[1] + softness * n[0] * n[1], last_own_[2] + softness * n[0] * n[1],
                   last_own_[3] + softness * n[1] * n[1]};
@@ -199,12 +206,16 @@ void WorkingSet::resize_last(double length_m) noexcept {
   const std::size_t i = size() - 1;
   Point& last = point_[i];
   const double spacing = law_->spacing_m;
+  // New tissue is cut where the tip goes; coming back, and going again, the segment keeps the course that was cut.
+  if (length_m > last.cut_m) {
+    const Vector2 chord = minus(tip_, last.begin_m);
+    last.heading = scaled(chord, 1.0 / dot(last.direction, chord));
+    last.cut_m = length_m;
+  }
   const double now = std::clamp(length_m, resize_step * spacing / 2, spacing);
   const bool grown_up = now == spacing && last.length_m != spacing;
   if (std::abs(now - last.length_m) < resize_step * spacing && !grown_up) return;
-  const Vector2 chord = minus(tip_, last.begin_m);
-  const double along = dot(last.direction, chord);
-  const Vector2 end = along > 0.0 ? plus(last.begin_m, scaled(chord, now / along)) : plus(last.begin_m, scaled(last.direction, now));
+  const Vector2 end = plus(last.begin_m, scaled(last.heading, now));
   last.at = geometry_.segment(last.begin_m, end, tip_cell_);
   last.material_m = geometry_.mean_m(last.at);
   last.length_m = now;
@@ -217,7 +228,7 @@ void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, 
   const double spacing = law_->spacing_m;
   Point point;
   point.begin_m = begin_m;
-  point.direction = direction;
+  point.direction = point.heading = direction;
   point.path_m = path_m;
   point.length_m = resize_step * spacing / 2;
   point.at = geometry_.segment(begin_m, plus(begin_m, scaled(direction, point.length_m)), tip_cell_);
@@ -371,8 +382,7 @@ void WorkingSet::follow_segments(const Vector2& direction, Trouble& trouble) noe
       trouble.full = true;
       break;
     }
-    const Vector2 chord = minus(tip_, last.begin_m);
-    const Vector2 next = plus(last.begin_m, scaled(chord, spacing / beyond));
+    const Vector2 next = plus(last.begin_m, scaled(last.heading, spacing));
     if (geometry_.locate(next, tip_cell_) < 0) break;
     push_segment(next, direction, last.path_m + spacing);
     beyond = beyond_last();

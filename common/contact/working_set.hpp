@@ -3,9 +3,9 @@
 // Path. The tip's own place X in the reference mesh solves X + u(X) = tip. While X moves on into new tissue the path grows, and while it
 // comes back the path shrinks; complete withdrawal forgets it. Lengths along the path are material lengths.
 //   Embedded: the path is cut into segments of law.spacing_m; contact j is the mean over segment j (a constant force density along it,
-//     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of a sixteenth
-//     of the spacing. While it is short its tie is softened by its own compliance times (spacing / length - 1), so that beginning or
-//     leaving it does not kick.
+//     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of a
+//     thirty-second of the spacing. While it is short its tie is softened by its own compliance times (spacing / length - 1), so that
+//     beginning or leaving it does not kick.
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
 //   in the
 //     reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the tip.
@@ -42,6 +42,8 @@ class WorkingSet {
     double path_m{};       // length of the path up to begin_m
     double arclength_m{};  // where it is anchored on the needle, from the base; the needle's owner keeps it
     double length_m{};     // embedded: that its weights stand for
+    Vector2 heading{};     // embedded: course of the cut per length along direction
+    double cut_m{};        // embedded: how far it was ever cut
     bool fresh{true};      // anchor it where it now is
   };
   // What could not be done in the last call; each leaves a consistent working set.
@@ -123,7 +125,9 @@ class WorkingSet {
   Solver solver_{};
   std::array<Point, capacity::contacts> point_{};
   std::array<Block, capacity::contacts> row_{};
-  Block last_own_{};  // of the last contact, without the softness of its tie
+  Block last_own_{};            // of the last contact, without the softness of its tie
+  std::size_t softened_{};      // the contact and
+  double softened_length_m_{};  // the length that the softness is for
   std::array<NodeCoupling, nodes_in_use> coupling_{};
   std::size_t coupling_count_{0};
   std::uint64_t clock_{0};

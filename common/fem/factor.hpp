@@ -7,7 +7,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string>
+#include <stdexcept>
+#include <vector>
 
 namespace trocar::fem {
 
@@ -38,11 +39,19 @@ class Factor {
 
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& right_hand_sides) const;
 
-  // sink(first, x) with x = A^-1 times columns first … of `right_hand_sides`, `block` columns at a time (the last may be fewer).
-  // Blocks are solved on all cores; the sink is called by one thread at a time, in any order of the blocks. What it throws ends the
-  // call and is thrown again. The values do not depend on which core solved a block.
+  // The rows of a block of solutions that are wanted: row[i] of its `rows` rows is the solution's unknown[i], the others are zero.
+  struct Wanted {
+    Eigen::Index rows{};
+    std::vector<int> row{};
+    std::vector<int> unknown{};
+  };
+  // sink(first, x) with the wanted rows of A^-1 times columns first … of `right_hand_sides`, `block` columns at a time (the last may be
+  // fewer). Only the part of L that the block's entries reach is solved downwards, only what leads to wanted rows upwards: columns that
+  // are close together in the mesh belong into one block. Blocks are solved on all cores, each by one, so the bits do not depend on their
+  // number; the sink is called by one thread at a time, in any order of the blocks. What it throws ends the call and is thrown again.
+  // Memory beyond the factor: on each core (unknowns + rows + widest supernode) x block numbers.
   using Sink = std::function<void(Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& x)>;
-  void solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, Eigen::Index block, const Sink& sink) const;
+  void solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, Eigen::Index block, const Wanted& wanted, const Sink& sink) const;
 
   [[nodiscard]] const Info& info() const;
 

@@ -14,6 +14,7 @@
 #include "common/config/user_error.hpp"
 #include "host/capture/recorder.hpp"
 #include "host/cli/demo.hpp"
+#include "host/cli/insert_command.hpp"
 #include "host/cli/rig_commands.hpp"
 #include "host/cli/scene_commands.hpp"
 #include "host/solve/solve.hpp"
@@ -151,6 +152,23 @@ int main(int argc, char** argv) {
   report_command->add_option("folder", folder, "folder of a run")->required();
   report_command->add_flag("--json", json, "the summary as JSON on stdout");
   report_command->callback([&] { code = cli::make_report(folder, json); });
+
+  auto* insert_command =
+      app.add_subcommand("insert",
+                         "a needle along a base path through a scene, by the model that runs in the controller\n"
+                         "Example: trocar insert phantom.toml --path path.csv --out result.csv --contacts-out contacts.csv");
+  cli::InsertOptions insert;
+  insert_command->add_option("scene", insert.scene, "scene file, or the name of one that comes with trocar")->required();
+  insert_command->add_option("--path", insert.path, "CSV t_s,x_m,y_m,theta_rad: poses of the needle's base; theta from base to tip")
+      ->required();
+  insert_command->add_option("--out", insert.out, "CSV to write: a row a path row, with base wrench, contacts, residual")->required();
+  insert_command->add_option("--contacts-out", insert.contacts_out, "CSV to write: every contact of every row");
+  insert_command->add_option("--method", insert.method, "embedded, snap, adapt or subdivide instead of the scene's");
+  insert_command->add_flag("--json", insert.json, "the summary as JSON on stdout");
+  insert_command->callback([&] {
+    insert.scene = config::find_share("scenes", insert.scene.string());
+    code = cli::run_insert(insert);
+  });
 
   auto* rig_command = app.add_subcommand("rig", "look at a rig, home, arm, hold and stop it");
   rig_command->require_subcommand(1);

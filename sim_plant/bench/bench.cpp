@@ -9,14 +9,14 @@ constexpr std::size_t rig_port = 0;       // drives follow at 1 …
 
 }  // namespace
 
-Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed)
+Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed)
     : rig_(rig),
       mail_(std::make_unique<controller::Mailboxes>()),
       drives_bus_(rig.buses.bitrate_bps),
       sensor_bus_(rig.buses.bitrate_bps),
       link_(rig_, drives_bus_.port(rig_port), sensor_bus_.port(rig_port)),
       controller_(rig_, *mail_, true),
-      plant_(rig, plant, phantom, seed) {
+      plant_(rig, plant, scene, seed) {
   for (std::size_t i = 0; i < WiredPlant::drives; ++i) (void)drives_bus_.port(i + 1);
   (void)sensor_bus_.port(1);
 }

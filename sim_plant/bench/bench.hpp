@@ -15,7 +15,7 @@ namespace trocar::sim_plant {
 
 class Bench {
  public:
-  Bench(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed);
+  Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed);
 
   // One controller period. Afterwards sample() is the tick's, and mail() has what the controller said.
   void tick() noexcept;

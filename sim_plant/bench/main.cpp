@@ -53,7 +53,7 @@ int run(const Options& options) {
   const auto entry = scene::entry_m(scene);
   const experiment::Placement placement{entry[1], entry[0], scene.needle->length_m};
   experiment::Sequencer sequencer(e, placement, rig, session);
-  sim_plant::Bench bench(rig, sim_plant::read_plant(config::find_share("plants", e.plant)), sim_plant::phantom_config(scene), options.seed);
+  sim_plant::Bench bench(rig, sim_plant::read_plant(config::find_share("plants", e.plant)), scene, options.seed);
 
   std::error_code error;
   std::filesystem::create_directories(options.out, error);

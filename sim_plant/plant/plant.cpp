@@ -53,14 +53,14 @@ TwinBodyConfig body_of(const rig::Rig& rig, const PlantConfig& plant) {
 
 }  // namespace
 
-Plant::Plant(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed)
+Plant::Plant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed)
     : actuation_(checked(rig).actuation),
       sensor_angle_rad_(rig.sensor.angle_rad),
       config_(checked(plant)),
       step_ns_(static_cast<std::int64_t>(1e9 / plant.step_hz)),
       step_s_(1.0 / plant.step_hz),
       current_loop_part_(-std::expm1(-2.0 * std::numbers::pi * plant.current_loop_hz / plant.step_hz)),
-      phantom_(phantom),
+      phantom_(scene),
       body_(body_of(rig, plant)),
       random_(seed) {
   require(body_.place({rig.homing_pose[0], rig.homing_pose[1], rig.homing_pose[2]}) == mechanism::Status::Ok,

@@ -22,7 +22,7 @@ class Plant {
  public:
   // Throws std::invalid_argument (fem::Error for the scene): a rig that is no twin, values out of range, a homing pose that the
   // true mechanism cannot take.
-  Plant(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed);
+  Plant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed);
 
   // Integrates all whole steps that end at or before time_ns with this torque command at the motors, in front of their gears.
   // NaN and infinity count as no torque. Time does not run backwards: an earlier time_ns does nothing.

@@ -47,17 +47,4 @@ PlantConfig read_plant(const std::filesystem::path& file) {
   return plant;
 }
 
-PhantomConfig phantom_config(const scene::Scene& scene) {
-  scene::require_rigid_insertion(scene);
-  PhantomConfig phantom;
-  phantom.tissue = scene.tissue;
-  phantom.needle.length_m = scene.needle->length_m;
-  phantom.contact = {scene.contact->shaft_n_per_m, scene.contact->tip_n_per_m, scene.contact->tip_zone_m, std::nullopt};
-  if (const contact::VelocityLaw& law = scene.contact->velocity; law.rows > 0) {
-    const auto rows = [&](const auto& column) { return std::vector<double>(column.begin(), column.begin() + law.rows); };
-    phantom.contact.velocity_law = VelocityLaw{scene.velocity_law, rows(law.speed_m_s), rows(law.shaft_n_per_m), rows(law.tip_n_per_m)};
-  }
-  return phantom;
-}
-
 }  // namespace trocar::sim_plant

@@ -1,4 +1,4 @@
-// plant.toml -> PlantConfig, and a scene that was read -> PhantomConfig.
+// plant.toml -> PlantConfig.
 //
 //   step_hz
 //   [drive] current_loop_hz, gear_efficiency
@@ -10,16 +10,11 @@
 
 #include <filesystem>
 
-#include "common/scene/scene.hpp"
-#include "sim_plant/phantom/config.hpp"
 #include "sim_plant/plant/config.hpp"
 
 namespace trocar::sim_plant {
 
 // Throws config::UserError with file, line, key and remedy.
 [[nodiscard]] PlantConfig read_plant(const std::filesystem::path& file);
-
-// Throws config::UserError for a scene that has no rigid insertion.
-[[nodiscard]] PhantomConfig phantom_config(const scene::Scene& scene);
 
 }  // namespace trocar::sim_plant

@@ -44,7 +44,7 @@ int run(const Options& options) {
   const auto rig_file = config::find_share("rigs", options.rig);
   const rig::Rig rig = config::read_twin(rig_file);
   const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
-  const auto phantom = sim_plant::phantom_config(scene::read_scene(config::find_share("scenes", options.scene)));
+  const scene::Scene scene = scene::read_scene(config::find_share("scenes", options.scene));
   hal::EndpointBus drives;
   hal::EndpointBus sensor;
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
@@ -53,7 +53,7 @@ int run(const Options& options) {
   };
   open(drives, rig.buses.drives, "drives");
   open(sensor, rig.buses.sensor, "sensor");
-  auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, phantom, options.seed);
+  auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, scene, options.seed);
   fmt::print("trocar-plant: {} before scene {}, seed {}\n", rig.name.data(), options.scene, options.seed);
   std::fflush(stdout);
 

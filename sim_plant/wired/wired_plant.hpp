@@ -16,8 +16,8 @@ namespace trocar::sim_plant {
 
 class WiredPlant {
  public:
-  WiredPlant(const rig::Rig& rig, const PlantConfig& plant, const PhantomConfig& phantom, std::uint64_t seed)
-      : physics_(rig, plant, phantom, seed), sensor_(make_sensor_config(rig)) {
+  WiredPlant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed)
+      : physics_(rig, plant, scene, seed), sensor_(make_sensor_config(rig)) {
     // Incremental encoders read anything at power-on; homing has to find out.
     Random offsets(seed);
     for (std::size_t i = 0; i < drives; ++i)

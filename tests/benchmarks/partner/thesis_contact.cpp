@@ -213,6 +213,7 @@ void ThesisContact::force_state(std::size_t contact, State state) noexcept {
 // Figure 5.4. Slipping ends when the slip has turned against the friction that it met.
 int ThesisContact::transition(std::size_t contact, const Target& target) noexcept {
   const Node& node = node_[contact];
+  const bool never_sticks = target.lower_n == target.upper_n;  // its force is known: the automaton would chatter
   State next = node.state;
   switch (node.state) {
     case State::Stuck:
@@ -220,10 +221,10 @@ int ThesisContact::transition(std::size_t contact, const Target& target) noexcep
       if (x_[2 * contact] < target.lower_n) next = State::Lower;
       break;
     case State::Upper:
-      if (node.slip_m < -slip_dead_band_m) next = State::Stuck;
+      if (!never_sticks && node.slip_m < -slip_dead_band_m) next = State::Stuck;
       break;
     case State::Lower:
-      if (node.slip_m > slip_dead_band_m) next = State::Stuck;
+      if (!never_sticks && node.slip_m > slip_dead_band_m) next = State::Stuck;
       break;
   }
   if (next == node.state) return 0;

@@ -46,6 +46,20 @@ inline Tissue block(const Grid& grid) {
   return tissue;
 }
 
+struct Kind {
+  Type type;
+  Model model;
+  Integration integration;
+};
+
+// For the names of parametrised tests: "Quad4PlaneStrainBBar".
+inline std::string name_of(const Kind& kind) {
+  constexpr const char* type[] = {"Tri3", "Quad4", "Tet4", "Hex8"};
+  constexpr const char* model[] = {"PlaneStress", "PlaneStrain", "Solid"};
+  return std::string(type[static_cast<int>(kind.type)]) + model[static_cast<int>(kind.model)] +
+         (kind.integration == Integration::BBar ? "BBar" : "");
+}
+
 // What an action that throws Error says, or nothing.
 template <class Action>
 std::string message_of(const Action& action) {

@@ -22,7 +22,7 @@ struct LockStep {
   std::vector<Reply> replies;
 
   explicit LockStep(std::uint64_t seed)
-      : bench(rig, read_plant(share / "plants/ubc_twin.toml"), phantom_config(scene::read_scene(share / "scenes/phantom.toml")), seed) {}
+      : bench(rig, read_plant(share / "plants/ubc_twin.toml"), scene::read_scene(share / "scenes/phantom.toml"), seed) {}
 
   void tick(int n) {
     for (int i = 0; i < n; ++i) {

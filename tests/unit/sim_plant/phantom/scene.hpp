@@ -18,24 +18,27 @@ inline fem::Grid square(int nodes, fem::Type element = fem::Type::Quad4) {
   return fem::uniform_grid(element, {-0.05, face_m, 0.0}, {0.1, 0.1, 0.0}, {nodes, nodes, 1});
 }
 
-inline PhantomConfig scene() {
-  PhantomConfig config;
-  config.tissue.thickness_m = 0.011;
-  config.tissue.grid = square(21);
-  config.tissue.zones = {{{25300.0, 0.48}, {}, {}}};
-  config.tissue.supports = {{fem::Side::YMax, {true, true, false}}};
-  config.needle.length_m = needle_m;
-  config.contact = {shaft_n_per_m, 68.0, 0.0025, {}};
-  return config;
+inline scene::Scene demo_scene() {
+  scene::Scene scene;
+  scene.tissue.thickness_m = 0.011;
+  scene.tissue.grid = square(21);
+  scene.tissue.zones = {{{25300.0, 0.48}, {}, {}}};
+  scene.tissue.supports = {{fem::Side::YMax, {true, true, false}}};
+  scene.needle.emplace().length_m = needle_m;
+  scene.contact.emplace();
+  scene.contact->shaft_n_per_m = shaft_n_per_m;
+  scene.contact->tip_n_per_m = 68.0;
+  scene.contact->tip_zone_m = 0.0025;
+  return scene;
 }
 
-inline VelocityLaw pvc() {
-  return {"pvc", {0.001, 0.003, 0.005, 0.007, 0.009}, {34.0, 44.8, 51.9, 56.5, 60.0}, {68.0, 67.5, 66.5, 64.5, 61.0}};
+inline contact::VelocityLaw pvc() {
+  return {5, {0.001, 0.003, 0.005, 0.007, 0.009}, {34.0, 44.8, 51.9, 56.5, 60.0}, {68.0, 67.5, 66.5, 64.5, 61.0}};
 }
 
 // Starts with the tip 5 mm in front of the tissue.
 struct Hand {
-  explicit Hand(const PhantomConfig& config = scene()) : phantom(config) { phantom.advance(pose, 1e-3); }
+  explicit Hand(const scene::Scene& scene = demo_scene()) : phantom(scene) { phantom.advance(pose, 1e-3); }
 
   // Straight in all three coordinates; after_step(previous wrench, wrench) after each.
   template <class AfterStep>
@@ -53,6 +56,8 @@ struct Hand {
   void move(double dx_m, double dy_m, double dtheta_rad = 0.0, double speed_m_s = 1e-3) {
     move(dx_m, dy_m, dtheta_rad, speed_m_s, [](const auto&, const auto&) {});
   }
+
+  [[nodiscard]] double path_m() const { return phantom.insertion().working_set().path_m(); }
 
   std::array<double, 3> pose{0.0, face_m - needle_m - 0.005, std::numbers::pi / 2};
   Phantom phantom;

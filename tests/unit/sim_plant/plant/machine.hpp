@@ -16,11 +16,11 @@ namespace trocar::sim_plant {
 inline std::filesystem::path shared(const std::string& file) { return std::filesystem::path(TROCAR_SHARE) / file; }
 inline rig::Rig shipped_rig() { return config::read_rig(shared("rigs/ubc_twin.toml")); }
 inline PlantConfig shipped_plant() { return read_plant(shared("plants/ubc_twin.toml")); }
-inline PhantomConfig shipped_phantom() { return phantom_config(scene::read_scene(shared("scenes/phantom.toml"))); }
+inline scene::Scene shipped_scene() { return scene::read_scene(shared("scenes/phantom.toml")); }
 
 struct Machine {
   explicit Machine(const PlantConfig& config = shipped_plant(), std::uint64_t seed = 1)
-      : rig(shipped_rig()), plant(rig, config, shipped_phantom(), seed) {}
+      : rig(shipped_rig()), plant(rig, config, shipped_scene(), seed) {}
 
   // Motor torques of least norm that put `wrench` on the handle.
   std::array<double, 4> motor_torque(const mechanism::Vec3& wrench) const {

@@ -57,34 +57,24 @@ TEST(PlantFile, NamesKeyAndRemedyOfAMistake) {
   EXPECT_NE(refusal("[sensor]", "[sensors]"), "");
 }
 
-TEST(PlantFile, TakesTheShippedSceneAsItIs) {
-  const PhantomConfig phantom = shipped_phantom();
-  EXPECT_EQ(phantom.tissue.model, fem::Model::PlaneStress);
-  EXPECT_EQ(phantom.tissue.grid->element, fem::Type::Quad4);
-  EXPECT_EQ(phantom.tissue.grid->axis_m[1].front(), 0.215);
-  EXPECT_EQ(phantom.tissue.thickness_m, 0.011);
-  ASSERT_EQ(phantom.tissue.zones.size(), 1u);
-  EXPECT_EQ(phantom.tissue.zones[0].material.young_pa, 25300.0);
-  ASSERT_EQ(phantom.tissue.supports.size(), 1u);
-  EXPECT_EQ(phantom.tissue.supports[0].where, fem::Where(fem::Side::YMax));
-  EXPECT_EQ(phantom.tissue.supports[0].fix, (std::array{true, true, false}));
-  EXPECT_EQ(phantom.needle.length_m, 0.10);
-  EXPECT_EQ(phantom.contact.tip_zone_m, 0.0025);
-  ASSERT_TRUE(phantom.contact.velocity_law.has_value());
+TEST(PlantFile, TheShippedSceneHasTheThesissDensities) {
+  const scene::Scene scene = shipped_scene();
+  const contact::Law& law = *scene.contact;
+  ASSERT_EQ(law.velocity.rows, 5u);
   // At the printed speed the law gives the printed densities.
-  EXPECT_EQ(phantom.contact.velocity_law->speed_m_s.front(), 0.001);
-  EXPECT_EQ(phantom.contact.velocity_law->shaft_n_per_m.front(), phantom.contact.shaft_n_per_m);
-  EXPECT_EQ(phantom.contact.velocity_law->tip_n_per_m.front(), phantom.contact.tip_n_per_m);
+  EXPECT_EQ(law.velocity.speed_m_s[0], 0.001);
+  EXPECT_EQ(law.velocity.shaft_n_per_m[0], law.shaft_n_per_m);
+  EXPECT_EQ(law.velocity.tip_n_per_m[0], law.tip_n_per_m);
   // And at 9 mm/s the tip's peak is below 0.1 % of the force at 70 mm.
-  const double excess = phantom.contact.velocity_law->tip_n_per_m.back() - phantom.contact.velocity_law->shaft_n_per_m.back();
-  EXPECT_LT(excess * phantom.contact.tip_zone_m, 0.001 * 0.07 * phantom.contact.velocity_law->shaft_n_per_m.back());
+  const double excess = law.velocity.tip_n_per_m[4] - law.velocity.shaft_n_per_m[4];
+  EXPECT_LT(excess * law.tip_zone_m, 0.001 * 0.07 * law.velocity.shaft_n_per_m[4]);
 }
 
 // 70 mm of insertion from the middle, with room before the tissue, must fit into the rig's workspace.
 TEST(PlantFile, SceneFitsTheRig) {
   const rig::Rig rig = shipped_rig();
-  const PhantomConfig phantom = shipped_phantom();
-  const double at_contact = phantom.tissue.grid->axis_m[1].front() - phantom.needle.length_m;
+  const scene::Scene scene = shipped_scene();
+  const double at_contact = scene.tissue.grid->axis_m[1].front() - scene.needle->length_m;
   EXPECT_GT(at_contact, rig.homing_pose[1] + 0.002);
   EXPECT_LT(at_contact + 0.070 + 0.010, rig.limits.workspace_y_m[1]);
 }

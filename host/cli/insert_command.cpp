@@ -1,0 +1,277 @@
+#include "host/cli/insert_command.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/condense/compile.hpp"
+#include "common/config/csv.hpp"
+#include "common/config/user_error.hpp"
+#include "common/fem/subdivide.hpp"
+#include "common/image_file/pending_file.hpp"
+#include "common/insertion/insertion.hpp"
+#include "common/scene/scene.hpp"
+
+namespace trocar::cli {
+namespace {
+
+using insertion::Insertion;
+using insertion::Pose;
+using insertion::Result;
+using insertion::Status;
+
+constexpr double longest_step_m = 1e-4;
+constexpr int most_steps = 100000;  // between two rows
+constexpr std::string_view path_header = "t_s,x_m,y_m,theta_rad";
+
+struct Row {
+  double t_s{};
+  Pose pose{};
+};
+
+std::vector<Row> read_path(const std::filesystem::path& file) {
+  const config::Csv csv = config::Csv::load(file, {path_header});
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < csv.rows(); ++i) {
+    rows.push_back({csv(i, 0), {csv(i, 1), csv(i, 2), csv(i, 3)}});
+    if (i > 0 && !(rows[i].t_s > rows[i - 1].t_s))
+      csv.fail(i, fmt::format("t_s = {}: not later than the row before ({}); sort the rows by time", rows[i].t_s, rows[i - 1].t_s));
+  }
+  return rows;
+}
+
+contact::Method method_of(const std::string& name) {
+  static const std::map<std::string, contact::Method> methods{{"embedded", contact::Method::Embedded},
+                                                              {"snap", contact::Method::Snap},
+                                                              {"adapt", contact::Method::Adapt},
+                                                              {"subdivide", contact::Method::Subdivide}};
+  const auto found = methods.find(name);
+  if (found == methods.end())
+    throw config::UserError(fmt::format("--method {}: there is no such method; write embedded, snap, adapt or subdivide", name));
+  return found->second;
+}
+
+std::string_view name_of(contact::State state) {
+  switch (state) {
+    case contact::State::Stuck:
+      return "stuck";
+    case contact::State::SlipForward:
+      return "slip_forward";
+    case contact::State::SlipBackward:
+      break;
+  }
+  return "slip_backward";
+}
+
+// A compiled scene and a needle in it. The large objects live on the heap.
+class Run {
+ public:
+  Run(const scene::Scene& scene, condense::Plan plan) {
+    condense::Options options;
+    options.visible = condense::WithVisible::No;
+    const bool show = isatty(STDERR_FILENO) == 1;
+    if (show)
+      options.progress = [](std::string_view phase, double fraction) { fmt::print(stderr, "\r{} {:3.0f} % ", phase, 100 * fraction); };
+    compiled_ = condense::compile(scene, plan, options);
+    if (show) fmt::print(stderr, "\r\x1b[K");
+    const model::ImageStatus status = model::open(compiled_.image.span(), image_);
+    if (status != model::ImageStatus::Ok) throw config::UserError(fmt::format("{}: {}", scene.file.string(), to_string(status)));
+    insertion_->open(image_);
+  }
+
+  // From the last row to this one. Returns the last step's result with the pivots of all, and the first status that is not Ok in `worst`.
+  Result advance(const Row& row, Status& worst) {
+    int steps = 1;
+    if (last_ && image_.law->explicit_count == 0) {
+      const double length = image_.needle.length_m;
+      const auto tip = [length](const Pose& p) {
+        return std::array{p.x_m + length * std::cos(p.theta_rad), p.y_m + length * std::sin(p.theta_rad)};
+      };
+      const double turn = std::abs(row.pose.theta_rad - last_->pose.theta_rad) * length;
+      const double base = std::hypot(row.pose.x_m - last_->pose.x_m, row.pose.y_m - last_->pose.y_m);
+      const double way = std::hypot(tip(row.pose)[0] - tip(last_->pose)[0], tip(row.pose)[1] - tip(last_->pose)[1]);
+      const double needed = std::ceil(std::max({turn, base, way}) / longest_step_m);
+      steps = static_cast<int>(std::clamp(needed, 1.0, static_cast<double>(most_steps)));
+    }
+    Result result;
+    int pivots = 0;
+    for (int k = 1; k <= steps; ++k) {
+      const double part = static_cast<double>(k) / steps;
+      Pose pose = row.pose;
+      if (k < steps) {
+        const Pose& from = last_->pose;
+        pose = {from.x_m + part * (row.pose.x_m - from.x_m), from.y_m + part * (row.pose.y_m - from.y_m),
+                from.theta_rad + part * (row.pose.theta_rad - from.theta_rad)};
+      }
+      const double dt = last_ ? (row.t_s - last_->t_s) / steps : 0.0;
+      result = insertion_->step(pose, dt);
+      pivots += result.pivots;
+      worst = std::max(worst, result.status);
+    }
+    last_ = row;
+    result.pivots = pivots;
+    return result;
+  }
+
+  [[nodiscard]] const Insertion& insertion() const { return *insertion_; }
+  [[nodiscard]] const model::Image& image() const { return image_; }
+
+ private:
+  condense::Compiled compiled_{};
+  model::Image image_{};
+  std::unique_ptr<Insertion> insertion_ = std::make_unique<Insertion>();
+  std::optional<Row> last_{};
+};
+
+// The material points that the tip cuts through, at least `spacing_m` apart, by the embedded method.
+std::vector<fem::Point> cut_path(const scene::Scene& scene, const std::vector<Row>& path) {
+  scene::Scene embedded = scene;
+  embedded.contact->method = contact::Method::Embedded;
+  Run run(embedded, condense::plan(embedded, condense::WithVisible::No));
+  std::vector<fem::Point> points;
+  double deepest = 0.0;
+  Status worst = Status::Ok;
+  for (const Row& row : path) {
+    (void)run.advance(row, worst);
+    const contact::WorkingSet& set = run.insertion().working_set();
+    if (set.size() == 0 || !(set.deepest_m() > deepest)) continue;
+    deepest = set.deepest_m();
+    if (points.empty()) {
+      const auto& entry = set.point(0).begin_m;
+      points.push_back({entry[0], entry[1], 0.0});
+    }
+    const auto tip = set.tip_material_m();
+    const double way = std::hypot(tip[0] - points.back()[0], tip[1] - points.back()[1]);
+    if (way > 0.25 * run.image().tissue.edge_length_m) points.push_back({tip[0], tip[1], 0.0});
+  }
+  return points;
+}
+
+// Subdivide: the mesh is cut along the path that the embedded method finds; then the path's nodes are contacts as they are passed.
+Run subdivided(scene::Scene scene, const std::vector<Row>& path) {
+  const std::vector<fem::Point> points = cut_path(scene, path);
+  fem::Mesh mesh = fem::make_mesh(scene.tissue);
+  for (std::size_t i = 1; i < points.size(); ++i) (void)fem::subdivide(mesh, points[i - 1], points[i]);
+  scene.contact->method = contact::Method::Snap;
+  return {scene, condense::plan(scene, std::move(mesh), condense::WithVisible::No)};
+}
+
+std::string off_shaft(const scene::Scene& scene, const Pose& base) {
+  const contact::Law& law = *scene.contact;
+  for (std::size_t i = 0; i < law.explicit_count; ++i) {
+    const double x = law.explicit_point_m[i][0];
+    const double y = law.explicit_point_m[i][1];
+    const double lateral = std::cos(base.theta_rad) * (y - base.y_m) - std::sin(base.theta_rad) * (x - base.x_m);
+    if (std::abs(lateral) > Insertion::explicit_point_tolerance_m)
+      return fmt::format(
+          "contact.points_m: point {} ({}, {}) m lies {:.3g} m beside the shaft of the first path row (base ({}, {}) m, theta {} rad); "
+          "move it onto the shaft, to 1e-9 m",
+          i + 1, x, y, std::abs(lateral), base.x_m, base.y_m, base.theta_rad);
+  }
+  return "contact.points_m: a point lies outside of the candidates; widen contact.corridor";
+}
+
+class Lines {
+ public:
+  explicit Lines(const std::filesystem::path& file, std::string_view header) : file_(file) { text_ = fmt::format("{}\n", header); }
+  template <typename... T>
+  void add(fmt::format_string<T...> format, T&&... values) {
+    fmt::format_to(std::back_inserter(text_), format, std::forward<T>(values)...);
+    if (text_.size() < flush_at) return;
+    flush();
+  }
+  void sync() {
+    flush();
+    file_.sync();
+  }
+  void commit() { file_.commit(); }
+
+ private:
+  static constexpr std::size_t flush_at = std::size_t{1} << 16U;
+  void flush() {
+    file_.write(std::as_bytes(std::span(text_)));
+    text_.clear();
+  }
+  image_file::PendingFile file_;
+  std::string text_;
+};
+
+}  // namespace
+
+int run_insert(const InsertOptions& options) {
+  scene::Scene scene = scene::read_scene(options.scene);
+  scene::require_rigid_insertion(scene);
+  if (!options.method.empty()) scene.contact->method = method_of(options.method);
+  const std::vector<Row> path = read_path(options.path);
+  Lines rows(options.out,
+             "t_s,x_m,y_m,theta_rad,tip_x_m,tip_y_m,tip_theta_rad,base_fx_n,base_fy_n,base_tau_nm,contacts,residual_n,pivots,solve_us");
+  std::optional<Lines> contacts;
+  if (!options.contacts_out.empty()) contacts.emplace(options.contacts_out, "step,contact,x_m,y_m,arclength_m,f_axial_n,f_lateral_n,state");
+
+  const bool subdivide = scene.contact->method == contact::Method::Subdivide;
+  if (subdivide && scene.contact->explicit_count > 0)
+    throw config::UserError(fmt::format("{}: contact.method = \"subdivide\" cuts a path, and explicit points cut none; write \"embedded\"",
+                                        scene.file.string()));
+  Run run = subdivide ? subdivided(scene, path) : Run(scene, condense::plan(scene, condense::WithVisible::No));
+
+  std::map<Status, std::pair<std::size_t, double>> trouble;  // rows, time of the first
+  std::vector<double> solve_us;
+  double residual = 0.0;
+  std::uint32_t most_contacts = 0;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Row& row = path[i];
+    Status worst = Status::Ok;
+    const auto begin = std::chrono::steady_clock::now();
+    const Result r = run.advance(row, worst);
+    const double us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
+    if (worst == Status::OffShaft) throw config::UserError(fmt::format("{}: {}", scene.file.string(), off_shaft(scene, row.pose)));
+    if (worst == Status::LeftCandidates)
+      throw config::UserError(fmt::format("{}: at t_s = {} the path leaves the candidate corridor; widen contact.corridor in {}",
+                                          options.path.string(), row.t_s, scene.file.string()));
+    if (worst != Status::Ok) {
+      auto& entry = trouble.try_emplace(worst, 0, row.t_s).first->second;
+      ++entry.first;
+    }
+    rows.add("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{},{:.17g},{},{:.3f}\n", row.t_s,
+             row.pose.x_m, row.pose.y_m, row.pose.theta_rad, r.tip.x_m, r.tip.y_m, r.tip.theta_rad, r.base.fx_n, r.base.fy_n, r.base.tau_nm,
+             r.contacts, r.residual_n, r.pivots, us);
+    solve_us.push_back(us);
+    residual = std::max(residual, r.residual_n);
+    most_contacts = std::max(most_contacts, r.contacts);
+    for (std::size_t k = 0; contacts && k < run.insertion().contacts(); ++k) {
+      const Insertion::ContactReport c = run.insertion().contact(k);
+      contacts->add("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{}\n", i, k, c.position_m[0], c.position_m[1], c.arclength_m, c.axial_n,
+                    c.lateral_n, name_of(c.state));
+    }
+  }
+  rows.sync();
+  if (contacts) contacts->sync();
+  rows.commit();
+  if (contacts) contacts->commit();
+
+  for (const auto& [status, count] : trouble)
+    fmt::print(stderr, "trocar: warning: {} of {} rows, first at t_s = {}: {}\n", count.first, path.size(), count.second,
+               to_string(status));
+  std::vector<double> sorted = solve_us;
+  std::sort(sorted.begin(), sorted.end());
+  const auto quantile = [&](double q) { return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1))]; };
+  if (options.json)
+    fmt::print(
+        "{{\"rows\": {}, \"contacts\": {}, \"residual_n\": {}, \"solve_us\": {{\"p50\": {:.3f}, \"p99\": {:.3f}, \"max\": {:.3f}}}, "
+        "\"warnings\": {}}}\n",
+        path.size(), most_contacts, residual, quantile(0.5), quantile(0.99), sorted.back(), trouble.size());
+  else
+    fmt::print("{} rows, at most {} contacts, residual at most {:.2g} N, a row took {:.1f} us (median; 99 %: {:.1f} us)\n", path.size(),
+               most_contacts, residual, quantile(0.5), quantile(0.99));
+  return 0;
+}
+
+}  // namespace trocar::cli
