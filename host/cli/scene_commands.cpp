@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "common/condense/compile.hpp"
 #include "common/config/new_file.hpp"
@@ -140,7 +141,7 @@ void print_info(const std::string& name, const model::Image& image, std::size_t 
 
 int scene_check(const std::string& name, bool json) {
   const scene::Scene scene = scene::read_scene(config::find_share("scenes", name));
-  const fem::Mesh mesh = condense::check_tissue(scene);
+  fem::Mesh mesh = condense::check_tissue(scene);
   if (!scene.needle || !scene.contact) {
     // For `trocar solve` alone; the compiler would refuse it.
     const std::size_t unknowns = mesh.node.size() * static_cast<std::size_t>(mesh.dimension());
@@ -153,7 +154,7 @@ int scene_check(const std::string& name, bool json) {
     }
     return 0;
   }
-  const condense::Plan plan = condense::plan(scene);
+  const condense::Plan plan = condense::plan(scene, std::move(mesh));
   if (json) {
     fmt::print("{{\"file\": {}, {}, \"compiles\": true}}\n", json_text(scene.file.string()), plan_json(plan));
   } else {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "../element/cases.hpp"
+#include "cases.hpp"
 #include "common/fem/statics.hpp"
 #include "models.hpp"
 

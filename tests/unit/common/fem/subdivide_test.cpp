@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "../element/cases.hpp"
+#include "cases.hpp"
 #include "common/fem/statics.hpp"
 #include "models.hpp"
 

@@ -182,7 +182,8 @@ TEST(Plant, HalvingTheStepChangesTheMotionLittle) {
   for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(pose[0][i], pose[2][i], 2e-6);
   EXPECT_NEAR(pose[0][2], pose[2][2], 2e-5);
   EXPECT_NEAR(force[0], force[2], 2e-3);
-  EXPECT_LT(std::abs(pose[1][1] - pose[2][1]), 0.6 * std::abs(pose[0][1] - pose[2][1]) + 1e-9);
+  // Down to the steps in which the last contact's ties follow the tip: some ten nanometres here.
+  EXPECT_LT(std::abs(pose[1][1] - pose[2][1]), 0.6 * std::abs(pose[0][1] - pose[2][1]) + 2e-8);
 }
 
 TEST(Plant, WithdrawalReversesTheForceAndEndsWithoutContact) {
