@@ -242,21 +242,29 @@ void Bench::meshes() {
                100.0 * steps[k]->slipping());
 }
 
-// What each skip saves: the same step with and without it. That it changes no result is a test of common/insertion.
+// What each skip saves: needle outside of the tissue, nothing changed, factor used again. That it changes no result is a test of
+// common/insertion.
 void Bench::skips() {
-  std::vector<Row> rows;
   using Motion = WholeStep::Motion;
-  constexpr std::pair<const char*, Motion> motions[] = {
-      {"skip_outside", Motion::Outside}, {"skip_rest", Motion::Rest}, {"skip_straight", Motion::ToAndFro}, {"skip_turn", Motion::Turn}};
-  for (const auto& [name, motion] : motions)
-    for (const bool skip : {true, false})
-      rows.push_back(
-          course_row(std::string(name) + (skip ? "/our_whole_step" : "/without_skips"), std::make_shared<WholeStep>(71, 32, motion, skip)));
+  std::vector<Row> rows;
+  const auto row = [&](const char* name, Motion motion, bool skip) {
+    rows.push_back(course_row(name, std::make_shared<WholeStep>(71, 32, motion, skip)));
+  };
+  row("skips/outside", Motion::Outside, true);
+  row("skips/rest", Motion::Rest, true);
+  row("skips/straight", Motion::ToAndFro, true);
+  row("skips/straight_factor_anew", Motion::ToAndFro, false);
+  row("skips/turn", Motion::Turn, true);
+  row("skips/turn_factor_anew", Motion::Turn, false);
   measure(rows, options_.turns(21));
   add(rows, 32, 71 * 71);
-  for (const auto& each : motions)
-    ratios_.push_back({fmt::format("{}: with / without skips", each.first),
-                       median(each.first, "our_whole_step") / median(each.first, "without_skips"), None, 0.0});
+  const auto ratio = [&](const char* what, const char* with, const char* without) {
+    ratios_.push_back({what, median("skips", with) / median("skips", without), None, 0.0});
+  };
+  ratio("whole step, needle outside of the tissue / turning", "outside", "turn");
+  ratio("whole step, at rest / turning", "rest", "turn");
+  ratio("whole step, straight: factor reused / anew", "straight", "straight_factor_anew");
+  ratio("whole step, turning: stuck rows of the factor reused / anew", "turn", "turn_factor_anew");
 }
 
 // The exact solution along a course of its own, tick by tick, by the reference.

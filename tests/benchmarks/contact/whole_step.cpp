@@ -36,12 +36,12 @@ insertion::Pose pose(double depth_m, double turn_rad) {
 
 }  // namespace
 
-WholeStep::WholeStep(int nodes_per_side, std::size_t contacts, Motion motion, bool skip) : motion_(motion) {
+WholeStep::WholeStep(int nodes_per_side, std::size_t contacts, Motion motion, bool reuse_factor) : motion_(motion) {
   bytes_ = condense::compile_to_memory(scene_of(nodes_per_side, contacts), {.visible = condense::WithVisible::No}).image;
   if (const model::ImageStatus status = model::open(bytes_.span(), image_); status != model::ImageStatus::Ok)
     throw std::runtime_error(std::string("the compiled scene is refused: ") + model::to_string(status));
   insertion_->open(image_);
-  insertion_->skip(skip);
+  insertion_->skip(reuse_factor);
   depth_m_ = -0.01;
   if (motion == Motion::Outside) return;
   for (; insertion_->contacts() < contacts; depth_m_ += 2e-4) {

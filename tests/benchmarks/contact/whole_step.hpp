@@ -19,7 +19,7 @@ class WholeStep {
     Outside  // in the air before the tissue
   };
   // Throws when the scene cannot be compiled or the contacts are not reached within the tissue.
-  WholeStep(int nodes_per_side, std::size_t contacts, Motion motion, bool skip = true);
+  WholeStep(int nodes_per_side, std::size_t contacts, Motion motion, bool reuse_factor = true);
   double tick();                          // seconds of the step
   [[nodiscard]] double slipping() const;  // share of the contacts
   [[nodiscard]] std::size_t contacts() const { return insertion_->contacts(); }
