@@ -328,12 +328,14 @@ void Solver::judge(std::span<const Target> target, Violations& v) noexcept {
 }
 
 Solution Solver::solve(std::span<const Target> target) noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   Solution solution;
   for (std::size_t i = 0; i < size_; ++i) {
     const Target& t = target[i];
     const bool finite =
         std::isfinite(t.tangent[0]) && std::isfinite(t.tangent[1]) && std::isfinite(t.gap_m[0]) && std::isfinite(t.gap_m[1]);
-    if (!finite || !(t.lower_n <= t.upper_n)) {
+    const bool bounded = t.lower_n <= t.upper_n && t.lower_n < infinity && t.upper_n > -infinity;
+    if (!finite || !bounded) {
       solution.status = SolverStatus::NotFinite;
       return solution;
     }
@@ -373,7 +375,7 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     } else {
       begin = static_cast<std::size_t>(v.count) - 1;
     }
-    for (std::size_t k = begin; k < static_cast<std::size_t>(v.count); ++k) {
+    for (std::size_t k = begin; k < static_cast<std::size_t>(v.count) && solution.pivots < max_pivots; ++k) {
       const std::size_t i = v.contact[k];
       set_state(i, v.becomes[k]);
       ++solution.pivots;
