@@ -1,6 +1,7 @@
 // Millions of exchanges on random compliances: nothing may build up.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -79,7 +80,7 @@ Outcome exchange(std::uint64_t seed, std::size_t s, double condition, long pivot
 }
 
 TEST(PivotsStress, NothingBuildsUp) {
-  const long pivots = counts(100'000, 2'500'000);
+  const long pivots = counts(500'000, 2'500'000);
   for (const auto& [s, condition] :
        {std::pair{std::size_t{8}, 1e2}, {std::size_t{16}, 1e4}, {std::size_t{24}, 1e6}, {std::size_t{40}, 1e3}}) {
     const Outcome outcome = exchange(s, s, condition, pivots);

@@ -27,14 +27,14 @@ class Walker {
  public:
   Walker(std::uint64_t seed, const Walk& walk, double needle_m) : random_(seed), walk_(walk), needle_m_(needle_m) {}
 
-  // 10 to 60 mm/s towards a place to be; there, another one. A third of them lies in front of the tissue.
+  // 10 to 200 mm/s towards a place to be; there, another one. Half of them lie in front of the tissue.
   [[nodiscard]] insertion::Pose next() {
     if (left_ == 0) {
       from_ = at_;
-      to_ = {random_.below(3) == 0 ? -0.01 : random_.uniform(0.0, walk_.deepest_m), random_.uniform(-walk_.sideways_m, walk_.sideways_m),
+      to_ = {random_.below(2) == 0 ? -0.01 : random_.uniform(0.0, walk_.deepest_m), random_.uniform(-walk_.sideways_m, walk_.sideways_m),
              random_.uniform(-walk_.turn_rad, walk_.turn_rad)};
-      left_ = steps_ =
-          1 + static_cast<int>(std::abs(to_[0] - from_[0]) / random_.uniform(1e-5, 6e-5)) + static_cast<int>(random_.below(20));
+      left_ = steps_ = 1 + static_cast<int>(std::abs(to_[0] - from_[0]) / (1e-5 * std::pow(20.0, random_.uniform(0.0, 1.0)))) +
+                       static_cast<int>(random_.below(20));
     }
     --left_;
     const double s = 1.0 - static_cast<double>(left_) / steps_;

@@ -112,6 +112,8 @@ void GridImage::add_rings() {
     for (std::size_t k = 0; k < cell_[e].count; ++k) ring[cell_[e].node[k]].push_back(static_cast<std::uint32_t>(e));
   ring_begin_.push_back(0);
   for (const auto& cells : ring) {
+    if (cells.size() <= capacity::ring_cells)
+      image_.need.ring_cells = std::max(image_.need.ring_cells, static_cast<std::uint32_t>(cells.size()));
     ring_cell_.insert(ring_cell_.end(), cells.begin(), cells.end());
     ring_begin_.push_back(static_cast<std::uint32_t>(ring_cell_.size()));
   }
@@ -151,6 +153,7 @@ void GridImage::add_buckets() {
   }
   bucket_begin_.push_back(0);
   for (const auto& cells : list) {
+    image_.need.cells_per_bucket = std::max(image_.need.cells_per_bucket, static_cast<std::uint32_t>(cells.size()));
     bucket_cell_.insert(bucket_cell_.end(), cells.begin(), cells.end());
     bucket_begin_.push_back(static_cast<std::uint32_t>(bucket_cell_.size()));
   }

@@ -99,8 +99,9 @@ void expect_reference(const reference::BoxQp& qp, const reference::Solution& kno
   for (std::size_t i = 0; i < solver.size(); ++i) {
     const Contact& c = solver.contact(i);
     const reference::Contact& at = qp.contact[i];
-    EXPECT_NEAR(c.axial_n, at.tangent[0] * c.force_n[0] + at.tangent[1] * c.force_n[1], 1e-12);
-    EXPECT_NEAR(c.lateral_n, -at.tangent[1] * c.force_n[0] + at.tangent[0] * c.force_n[1], 1e-12);
+    const double rounding = 1e-15 * (1.0 + std::hypot(c.force_n[0], c.force_n[1]));
+    EXPECT_NEAR(c.axial_n, at.tangent[0] * c.force_n[0] + at.tangent[1] * c.force_n[1], rounding);
+    EXPECT_NEAR(c.lateral_n, -at.tangent[1] * c.force_n[0] + at.tangent[0] * c.force_n[1], rounding);
     switch (c.state) {
       case State::Stuck:
         EXPECT_NEAR(c.slip_m, 0.0, 1e-12);

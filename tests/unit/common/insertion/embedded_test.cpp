@@ -192,13 +192,9 @@ TEST(Embedded, NamesTheEndOfTheCandidates) {
     hand.image().tissue.node_flags = flags;
     hand.image().tissue.buckets.begin = begin;
     hand.image().tissue.buckets.cell = list;
-    hand.pose = {-0.03, -0.07, std::numbers::pi / 4};  // aims across the limit
-    hand.pose = {-0.0507 - 0.03, -0.0707, std::numbers::pi / 4};
-    hand.open();
     const double step = std::numbers::sqrt2 / 2;
-    hand.pose.x_m = -0.02 - needle_m * step;
-    hand.pose.y_m = -0.005 - needle_m * step;
-    hand.step();
+    hand.pose = {-0.02 - needle_m * step, -0.005 - needle_m * step, std::numbers::pi / 4};  // aims across the limit
+    hand.open();
     ASSERT_EQ(hand.model().contacts(), 0u);
     hand.move(0.025 * step, 0.025 * step);
     EXPECT_EQ(hand.worst(), Status::Ok);

@@ -27,7 +27,7 @@ inline constexpr double tip_excess_n = (68.0 - 34.0) * 0.0025;
 // Building an image takes a while: one for each kind of mesh in a program.
 [[nodiscard]] inline reference::GridImage& grid_of(fem::Type type, double distortion = 0.0) {
   static reference::GridImage tri({.element = fem::Type::Tri3});
-  static reference::GridImage quad({});
+  static reference::GridImage quad(reference::Block{});
   static reference::GridImage bent_tri({.element = fem::Type::Tri3, .distortion = 0.2});
   static reference::GridImage bent_quad({.distortion = 0.2});
   if (distortion > 0.0) return type == fem::Type::Tri3 ? bent_tri : bent_quad;
@@ -120,12 +120,18 @@ struct Balance {
   const Vector2 t = hand.axis();
   for (std::size_t i = 0; i < set.size(); ++i) {
     const contact::Embedding& at = set.point(i).at;
-    Vector2 x{};
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(whole.statics().degrees_of_freedom(), 2);
+    for (std::uint32_t k = 0; k < at.count; ++k)
+      for (Eigen::Index c = 0; c < 2; ++c) unit(2 * static_cast<Eigen::Index>(at.node[k]) + c, c) += at.weight[k];
+    const Eigen::Matrix2d own = unit.transpose() * whole.statics().solve(unit);
+    const contact::Block tied = set.solver().compliance(i, i);
+    const Vector2& f = set.solver().contact(i).force_n;
+    Vector2 x{(tied[0] - own(0, 0)) * f[0] + (tied[1] - own(0, 1)) * f[1], (tied[2] - own(1, 0)) * f[0] + (tied[3] - own(1, 1)) * f[1]};
+    if (i + 1 < set.size()) balance.stretch_m = std::max(balance.stretch_m, std::hypot(x[0], x[1]));
     for (std::uint32_t k = 0; k < at.count; ++k)
       for (std::size_t c = 0; c < 2; ++c)
         x[c] += at.weight[k] * (whole.mesh().node[at.node[k]][c] + u(static_cast<Eigen::Index>(2 * at.node[k] + c)));
     const Vector2 arm{x[0] - hand.pose.x_m, x[1] - hand.pose.y_m};
-    const Vector2& f = set.solver().contact(i).force_n;
     sum.fx_n += f[0];
     sum.fy_n += f[1];
     sum.tau_nm += arm[0] * f[1] - arm[1] * f[0];

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "hand.hpp"
@@ -40,15 +41,27 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"adapt_bent_quad", fem::Type::Quad4, 0.2, Method::Adapt}),
     [](const auto& made) { return made.param.name; });
 
-// Once everything slips, the force is the density times the path, and the tip's excess.
+// The force is never more than the density times the path, and the tip's excess, and just that while everything slips. A node that has just
+// become a contact is dragged along before it slips.
 TEST_P(InsertionBy, TheBaseCarriesTheDensityTimesThePath) {
   Hand hand(grid(), GetParam().method);
   hand.pose.x_m = 0.0013;  // on no mesh line
   hand.step();
-  for (const double more : {0.025, 0.02, 0.03}) {
-    hand.move(0.0, more);
-    EXPECT_NEAR(hand.base().fy_n, shaft_n_per_m * hand.path_m() + tip_excess_n, 1e-6);
-  }
+  int slipping = 0;
+  int steps = 0;
+  hand.move(0.0, 0.075, 0.0, 1e-3, [&](const Wrench&, const Result& now) {
+    const double zone = std::min(now.path_m, 0.0025);
+    const double most = shaft_n_per_m * now.path_m + 34.0 * zone;
+    EXPECT_LE(now.base.fy_n, most + 1e-9);
+    bool all = now.contacts > 0;
+    for (std::size_t i = 0; i < hand.model().contacts(); ++i) all = all && hand.model().contact(i).state == State::SlipForward;
+    ++steps;
+    if (!all) return;
+    ++slipping;
+    EXPECT_NEAR(now.base.fy_n, most, 1e-9);
+  });
+  EXPECT_GT(slipping, steps / (embedded() ? 2 : 8));
+  EXPECT_GT(hand.base().fy_n, 0.9 * (shaft_n_per_m * hand.path_m() + tip_excess_n));
   EXPECT_LT(hand.path_m(), 0.070 - 0.002);  // the tissue gives way
   EXPECT_GT(hand.path_m(), 0.070 - 0.010);
   EXPECT_LT(hand.worst_residual_n(), 1e-9);
@@ -64,19 +77,18 @@ TEST_P(InsertionBy, ForcesBalanceOnTheWholeMesh) {
     const auto moved = adapted(grid(), hand);
     const Balance balance = balance_of(moved ? *moved : grid(), hand);
     EXPECT_LT(balance.wrench, 1e-8);
-    // A segment's tie is soft by a millionth, the last one's by its newness: its contact is left out of this.
-    EXPECT_GT(hand.model().contacts(), 6u);
-    return balance.off_axis_m;
+    EXPECT_LT(balance.off_axis_m, 1e-10);
+    // A segment's tie is soft by a millionth of its own compliance, a node's by a millionth of that.
+    EXPECT_LT(balance.stretch_m, embedded() ? 1e-7 : 1e-12);
+    EXPECT_GT(hand.model().contacts(), 5u);
   };
-  // Node contacts are tied with a softness of 1e-12.
-  const double limit = embedded() ? 1e-3 : 1e-10;
-  EXPECT_LT(check(), limit);
+  check();
   hand.move(0.002, 0.0, 0.03);
-  EXPECT_LT(check(), limit);
+  check();
   hand.move(0.0, -0.01, -0.02);
-  EXPECT_LT(check(), limit);
+  check();
   hand.move(-0.002, 0.02);
-  EXPECT_LT(check(), limit);
+  check();
   if (GetParam().method == Method::Adapt) {
     EXPECT_GT(hand.model().working_set().geometry().moved(), 3u);
   }
@@ -91,7 +103,7 @@ TEST_P(InsertionBy, SticksOnReversalThenPullsBackThenLetsGo) {
   const double path = hand.path_m();
   hand.move(0.0, -0.0002);
   std::size_t stuck = 0;
-  for (std::size_t i = 0; i < hand.model().contacts(); ++i) stuck += hand.model().contact(i).state == State::Stuck ? 1 : 0;
+  for (std::size_t i = 0; i < hand.model().contacts(); ++i) stuck += hand.model().contact(i).state == State::Stuck ? 1U : 0U;
   EXPECT_GE(stuck + 2, hand.model().contacts());
   EXPECT_LT(hand.base().fy_n, pushed);
   EXPECT_GT(hand.base().fy_n, 0.85 * pushed);
@@ -161,7 +173,7 @@ TEST_P(InsertionBy, FrictionTakesEnergyOverClosedLoops) {
   const std::array<Pose, 2> stroke{{{0.0, -0.015, 0.0}, {0.0, 0.015, 0.0}}};
   (void)loop(stroke);
   const auto [work, slip_work] = loop(stroke);
-  EXPECT_GT(work, 0.01);
+  EXPECT_GT(work, 0.002);
   EXPECT_LT(work, 2 * 2.0 * 0.015);  // the thresholds along the whole stroke
   // What the hand put in is what friction took, but for what the contacts that come and go store.
   EXPECT_NEAR(work, slip_work, (embedded() ? 0.002 : 0.05) * work);
@@ -287,20 +299,30 @@ TEST_P(InsertionBy, PassesThroughTheFarFaceWithoutNewContacts) {
 
 TEST_P(InsertionBy, TakesPosesBeyondAllSense) {
   Hand hand(grid(), GetParam().method);
+  hand.law().velocity = rising_law();
+  hand.open();
   hand.move(0.0, 0.04);
   for (const double huge : {1e3, 1e10, 1e100, 1e300, std::numeric_limits<double>::max(), std::numeric_limits<double>::denorm_min()}) {
     for (const Pose& pose : {Pose{huge, -0.06, 1.57}, Pose{0.0, -huge, 1.57}, Pose{0.0, huge, 1.57}, Pose{0.0, -0.06, huge}}) {
       const Result result = hand.model().step(pose, 1e-3);
       for (const double value : wrench_of(result)) EXPECT_TRUE(std::isfinite(value)) << huge << ' ' << to_string(result.status);
       EXPECT_TRUE(std::isfinite(result.path_m));
+      EXPECT_TRUE(std::isfinite(hand.model().speed_m_s())) << huge;
     }
   }
   hand.pose = {0.0, -1.0, std::numbers::pi / 2};
   for (int k = 0; k < 3; ++k) hand.step();
-  hand.pose = {0.0, -needle_m - 0.005, std::numbers::pi / 2};
-  hand.step();
-  hand.move(0.0, 0.04);
-  EXPECT_NEAR(hand.base().fy_n, shaft_n_per_m * hand.path_m() + tip_excess_n, 1e-6);
+  hand.model().reset();  // the speed of that
+  Hand fresh(grid(), GetParam().method);
+  fresh.law().velocity = rising_law();
+  fresh.open();
+  fresh.model().reset();
+  for (Hand* h : {&hand, &fresh}) {
+    h->pose = {0.001, -needle_m - 0.005, std::numbers::pi / 2};
+    h->step();
+    h->move(0.001, 0.04, 0.02);
+  }
+  EXPECT_EQ(wrench_of(hand.result()), wrench_of(fresh.result()));
 }
 
 }  // namespace
