@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/condense/float32_error.hpp"
-#include "common/config/user_error.hpp"
+#include "common/condense/naming_the_file.hpp"
 #include "common/fem/statics.hpp"
 
 namespace trocar::condense {
@@ -42,8 +42,14 @@ Condensed condense(const fem::Statics& statics, const Plan& plan, const Options&
   result.compliance.resize(n, n);
   result.visible.resize(options.visible == WithVisible::Yes ? static_cast<std::size_t>(visible_rows * n) : 0);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> average = load.transpose();
+  std::vector<bool> wanted(static_cast<std::size_t>(load.rows()), false);
+  for (Eigen::Index column = 0; column < n; ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator it(load, column); it; ++it) wanted[static_cast<std::size_t>(it.row())] = true;
+  if (!result.visible.empty())
+    for (const int node : plan.visible.node)
+      for (Eigen::Index axis = 0; axis < dimension; ++axis) wanted[static_cast<std::size_t>(dimension * node + axis)] = true;
   Eigen::Index done = 0;
-  statics.solve_columns(load, block_columns, [&](Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& u) {
+  statics.solve_columns(load, block_columns, wanted, [&](Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& u) {
     result.compliance.middleCols(first, u.cols()) = average * u;
     if (!result.visible.empty())
       for (Eigen::Index c = 0; c < u.cols(); ++c) {
@@ -134,11 +140,7 @@ Compiled compile_checked(const scene::Scene& scene, const Plan& plan, const Opti
 }  // namespace
 
 Compiled compile(const scene::Scene& scene, const Plan& plan, const Options& options) {
-  try {
-    return compile_checked(scene, plan, options);
-  } catch (const fem::Error& error) {
-    throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
-  }
+  return naming_the_file(scene, [&] { return compile_checked(scene, plan, options); });
 }
 
 Compiled compile_to_memory(const scene::Scene& scene, const Options& options) {

@@ -17,7 +17,7 @@ namespace trocar::condense {
 using Progress = std::function<void(std::string_view phase, double fraction)>;
 
 struct Options {
-  std::size_t most_memory_bytes = std::size_t{16} << 30U;
+  std::size_t most_memory_bytes = 16'000'000'000;
   WithVisible visible = WithVisible::Yes;
   Progress progress{};
 };

@@ -7,8 +7,10 @@
 #include <cmath>
 #include <map>
 
-#include "common/config/user_error.hpp"
+#include "common/condense/naming_the_file.hpp"
 #include "common/core/capacities.hpp"
+#include "common/fem/assembly.hpp"
+#include "common/fem/statics.hpp"
 
 namespace trocar::condense {
 namespace {
@@ -151,8 +153,7 @@ void plan_cost(const scene::Scene& scene, WithVisible with_visible, Plan& plan) 
   cost.factor_bytes = factor_estimate(static_cast<double>(cost.unknowns), mesh.dimension());
 }
 
-Plan plan_checked(const scene::Scene& scene, std::optional<fem::Mesh> given, WithVisible with_visible) {
-  fem::Mesh mesh = given ? std::move(*given) : fem::make_mesh(scene.tissue);
+Plan plan_checked(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible) {
   check_method(scene, mesh.dimension() == 3);
   Candidates candidates = candidates_of(mesh, scene);
   Plan result{.mesh = std::move(mesh), .candidates = std::move(candidates)};
@@ -198,21 +199,21 @@ std::size_t peak_memory_bytes(const Cost& cost, std::size_t factor_bytes) {
          2 * cost.visible_bytes;
 }
 
-namespace {
-
-Plan plan_or_explain(const scene::Scene& scene, std::optional<fem::Mesh> mesh, WithVisible with_visible) {
-  try {
-    return plan_checked(scene, std::move(mesh), with_visible);
-  } catch (const fem::Error& error) {
-    throw config::UserError(scene.file.empty() ? std::string(error.what()) : scene.file.string() + ": " + error.what());
-  }
+fem::Mesh check_tissue(const scene::Scene& scene) {
+  return naming_the_file(scene, [&] {
+    fem::Mesh mesh = fem::make_mesh(scene.tissue);
+    (void)fem::supported_degrees_of_freedom(mesh, scene.tissue.supports);
+    (void)fem::assemble_stiffness(mesh, scene.tissue);
+    return mesh;
+  });
 }
 
-}  // namespace
+Plan plan(const scene::Scene& scene, WithVisible with_visible) {
+  return naming_the_file(scene, [&] { return plan_checked(scene, fem::make_mesh(scene.tissue), with_visible); });
+}
 
-Plan plan(const scene::Scene& scene, WithVisible with_visible) { return plan_or_explain(scene, std::nullopt, with_visible); }
 Plan plan(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_visible) {
-  return plan_or_explain(scene, std::move(mesh), with_visible);
+  return naming_the_file(scene, [&] { return plan_checked(scene, std::move(mesh), with_visible); });
 }
 
 }  // namespace trocar::condense

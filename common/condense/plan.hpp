@@ -44,6 +44,10 @@ struct Plan {
 
 [[nodiscard]] std::size_t peak_memory_bytes(const Cost& cost, std::size_t factor_bytes);
 
+// The mesh of a scene, with supports that hold it and elements that can be assembled, whether it has a needle or not. Throws
+// config::UserError.
+[[nodiscard]] fem::Mesh check_tissue(const scene::Scene& scene);
+
 enum class WithVisible { No, Yes };
 
 // Throws config::UserError that begins with the scene's file: everything that candidates_of() throws, no needle or contact, a needle that

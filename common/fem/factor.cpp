@@ -26,6 +26,29 @@ class Cholmod {
   cholmod_common common{};
 };
 
+// Blocks are solved one a core, so the BLAS itself must not divide them again: two threads that each call a BLAS of two threads take three
+// times as long. Its number of threads belongs to the whole process, hence the count of those who want it to be one.
+class OneBlasThread {
+ public:
+  OneBlasThread() {
+    const std::lock_guard lock(guard);
+    if (wanted++ > 0) return;
+    before = openblas_get_num_threads();
+    openblas_set_num_threads(1);
+  }
+  ~OneBlasThread() {
+    const std::lock_guard lock(guard);
+    if (--wanted == 0) openblas_set_num_threads(before);
+  }
+  OneBlasThread(const OneBlasThread&) = delete;
+  OneBlasThread& operator=(const OneBlasThread&) = delete;
+
+ private:
+  inline static std::mutex guard;
+  inline static int wanted = 0;
+  inline static int before = 1;
+};
+
 using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // one row an unknown, in the factor's order
 
 }  // namespace
@@ -47,7 +70,12 @@ struct Factor::Supernodal {
   [[nodiscard]] const double* values(int s) const { return static_cast<const double*>(l->x) + value_begin[static_cast<std::size_t>(s)]; }
   void read_structure();
   void check_pivots(const Eigen::VectorXd& diagonal) const;
-  void solve(Block& x, Block& work, const std::vector<char>& reached) const;
+  void solve(Block& x, Block& work, const std::vector<char>& reached, const std::vector<char>& needed) const;
+  // Marks every ancestor of a marked supernode; children come before their parents.
+  void close_upwards(std::vector<char>& marked) const {
+    for (std::size_t s = 0; s < marked.size(); ++s)
+      if (marked[s] != 0 && parent[s] >= 0) marked[static_cast<std::size_t>(parent[s])] = 1;
+  }
 };
 
 void Factor::Supernodal::read_structure() {
@@ -86,9 +114,10 @@ void Factor::Supernodal::check_pivots(const Eigen::VectorXd& diagonal) const {
   }
 }
 
-// L L^T x = b in place. Supernodes that are not `reached` by b are passed over on the way down: x stays zero there.
-// Row-major blocks are column-major transposes, hence the sides on which L stands.
-void Factor::Supernodal::solve(Block& x, Block& work, const std::vector<char>& reached) const {
+// L L^T x = b in place. Supernodes that are not `reached` by b are passed over on the way down: x stays zero there. Those that no wanted
+// row `needed` are passed over on the way up: x is no solution there. Row-major blocks are column-major transposes, hence the sides on
+// which L stands.
+void Factor::Supernodal::solve(Block& x, Block& work, const std::vector<char>& reached, const std::vector<char>& needed) const {
   const auto m = static_cast<int>(x.cols());
   const auto stride = static_cast<std::size_t>(m);
   double* const data = x.data();
@@ -107,6 +136,7 @@ void Factor::Supernodal::solve(Block& x, Block& work, const std::vector<char>& r
   }
   for (int s = supernodes() - 1; s >= 0; --s) {
     const auto u = static_cast<std::size_t>(s);
+    if (needed[u] == 0) continue;
     const int columns = super[u + 1] - super[u];
     const int rows = row_begin[u + 1] - row_begin[u];
     const int below = rows - columns;
@@ -163,6 +193,7 @@ const Factor::Info& Factor::info() const { return l_->info; }
 
 Eigen::MatrixXd Factor::solve(const Eigen::MatrixXd& right_hand_sides) const {
   constexpr Eigen::Index most = 64;
+  const OneBlasThread one_thread;
   const Eigen::Index n = right_hand_sides.rows();
   const std::vector<char> all(l_->super.size() - 1, 1);
   Eigen::MatrixXd result(n, right_hand_sides.cols());
@@ -171,15 +202,24 @@ Eigen::MatrixXd Factor::solve(const Eigen::MatrixXd& right_hand_sides) const {
     Block x(n, count);
     Block work(l_->most_rows, count);
     for (Eigen::Index i = 0; i < n; ++i) x.row(l_->place[static_cast<std::size_t>(i)]) = right_hand_sides.row(i).segment(first, count);
-    l_->solve(x, work, all);
+    l_->solve(x, work, all, all);
     for (Eigen::Index i = 0; i < n; ++i) result.row(i).segment(first, count) = x.row(l_->place[static_cast<std::size_t>(i)]);
   }
   return result;
 }
 
-void Factor::solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, Eigen::Index block, const Sink& sink) const {
+void Factor::solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, Eigen::Index block, const Wanted& wanted,
+                           const Sink& sink) const {
+  const OneBlasThread one_thread;
   const Eigen::Index n = right_hand_sides.rows();
   const Eigen::Index blocks = (right_hand_sides.cols() + block - 1) / block;
+  std::vector<char> needed(l_->super.size() - 1, 0);
+  std::vector<int> place(wanted.unknown.size());
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    place[i] = l_->place[static_cast<std::size_t>(wanted.unknown[i])];
+    needed[static_cast<std::size_t>(l_->column_super[static_cast<std::size_t>(place[i])])] = 1;
+  }
+  l_->close_upwards(needed);
   std::mutex guard;
   Eigen::Index next = 0;
   std::exception_ptr failure;
@@ -207,11 +247,10 @@ void Factor::solve_columns(const Eigen::SparseMatrix<double>& right_hand_sides, 
             x(k, c) = it.value();
             reached[static_cast<std::size_t>(l_->column_super[static_cast<std::size_t>(k)])] = 1;
           }
-        for (std::size_t s = 0; s < reached.size(); ++s)
-          if (reached[s] != 0 && l_->parent[s] >= 0) reached[static_cast<std::size_t>(l_->parent[s])] = 1;
-        l_->solve(x, work, reached);
-        result.resize(n, count);
-        for (Eigen::Index i = 0; i < n; ++i) result.row(i) = x.row(l_->place[static_cast<std::size_t>(i)]);
+        l_->close_upwards(reached);
+        l_->solve(x, work, reached, needed);
+        if (result.cols() != count) result.setZero(wanted.rows, count);
+        for (std::size_t i = 0; i < place.size(); ++i) result.row(wanted.row[i]) = x.row(place[i]);
         const std::lock_guard lock(guard);
         if (failure) return;
         try {  // here, while nobody else can call the sink

@@ -39,6 +39,16 @@ Eigen::MatrixXd Statics::solve(const Eigen::MatrixXd& loads_n, const Eigen::Matr
 }
 
 void Statics::solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::Index block, const Sink& sink) const {
+  solve_columns(loads_n, block, std::vector<bool>(static_cast<std::size_t>(degrees_of_freedom()), true), sink);
+}
+
+void Statics::solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::Index block, const std::vector<bool>& wanted,
+                            const Sink& sink) const {
+  if (equations_.count() == 0) {
+    for (Eigen::Index first = 0; first < loads_n.cols(); first += block)
+      sink(first, Eigen::MatrixXd::Zero(degrees_of_freedom(), std::min(block, loads_n.cols() - first)));
+    return;
+  }
   Eigen::SparseMatrix<double> right(equations_.count(), loads_n.cols());
   right.reserve(loads_n.nonZeros());
   for (Eigen::Index column = 0; column < loads_n.cols(); ++column) {
@@ -47,16 +57,13 @@ void Statics::solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::I
       if (const int i = equations_.row[static_cast<std::size_t>(it.row())]; i >= 0) right.insertBack(i, column) = it.value();
   }
   right.finalize();
-  Eigen::MatrixXd displacement;
-  const auto expand = [&](Eigen::Index first, const Eigen::Ref<const Eigen::MatrixXd>& x) {
-    displacement.setZero(degrees_of_freedom(), x.cols());
-    for (Eigen::Index i = 0; i < displacement.rows(); ++i)
-      if (!supported(i)) displacement.row(i) = x.row(equations_.row[static_cast<std::size_t>(i)]);
-    sink(first, displacement);
-  };
-  if (equations_.count() > 0) return factor_->solve_columns(right, block, expand);
-  for (Eigen::Index first = 0; first < loads_n.cols(); first += block)
-    sink(first, Eigen::MatrixXd::Zero(degrees_of_freedom(), std::min(block, loads_n.cols() - first)));
+  Factor::Wanted rows{degrees_of_freedom(), {}, {}};
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (wanted[i] && equations_.row[i] >= 0) {
+      rows.row.push_back(static_cast<int>(i));
+      rows.unknown.push_back(equations_.row[i]);
+    }
+  factor_->solve_columns(right, block, rows, sink);
 }
 
 }  // namespace trocar::fem

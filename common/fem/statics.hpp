@@ -43,6 +43,10 @@ class Statics {
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& loads_n, const Eigen::MatrixXd& prescribed_m) const;
   // Many sparse load cases, as Factor::solve_columns: sink(first, u) with u degrees_of_freedom() x (columns of the block).
   void solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::Index block, const Sink& sink) const;
+  // The same where few rows of u are looked at: those that are not `wanted` (one entry a degree of freedom) are zero, and what leads to
+  // them alone is not computed.
+  void solve_columns(const Eigen::SparseMatrix<double>& loads_n, Eigen::Index block, const std::vector<bool>& wanted,
+                     const Sink& sink) const;
 
  private:
   Equations equations_;

@@ -79,7 +79,8 @@ bool Insertion::place_explicit() noexcept {
   for (std::size_t i = 0; i < law.explicit_count; ++i) {
     const Vector2 from_base{law.explicit_point_m[i][0] - base[0], law.explicit_point_m[i][1] - base[1]};
     const double lateral = axis_[0] * from_base[1] - axis_[1] * from_base[0];
-    if (!(std::abs(lateral) <= explicit_point_tolerance_m) || !set_.place(law.explicit_point_m[i])) {
+    const bool on_shaft = std::abs(lateral) <= explicit_point_tolerance_m && dot(axis_, from_base) >= -explicit_point_tolerance_m;
+    if (!on_shaft || !set_.place(law.explicit_point_m[i])) {
       set_.clear();
       return false;
     }

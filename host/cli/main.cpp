@@ -16,6 +16,7 @@
 #include "host/cli/demo.hpp"
 #include "host/cli/insert_command.hpp"
 #include "host/cli/rig_commands.hpp"
+#include "host/cli/scene_commands.hpp"
 #include "host/solve/solve.hpp"
 
 namespace {
@@ -74,6 +75,40 @@ int main(int argc, char** argv) {
     code = cli::run_demo(experiment, stop_asked);
   });
 
+  auto* scene_command = app.add_subcommand("scene", "check a scene, compile it into a model image, look at scenes and images");
+  scene_command->require_subcommand(1);
+  std::string scene;
+  cli::SceneCompileOptions compile;
+  const auto add_scene = [&](const char* name, const char* text, std::string& what, const char* what_text) {
+    auto* c = scene_command->add_subcommand(name, text);
+    c->add_option("scene", what, what_text)->required();
+    c->add_flag("--json", json, "machine-readable, on stdout");
+    return c;
+  };
+  add_scene("check", "read a scene, mesh it, try its supports, and say what compiling would cost\nExample: trocar scene check phantom",
+            scene, "scene name, or path of its TOML file")
+      ->callback([&] { code = cli::scene_check(scene, json); });
+  add_scene("info",
+            "sizes, capacities, storage error and tick cost of an image, or of a scene compiled in memory\nExample: trocar scene info "
+            "phantom.image",
+            scene, "path of an image, or scene name, or path of a scene's TOML file")
+      ->callback([&] { code = cli::scene_info(scene, json, stop_asked); });
+  auto* compile_command = add_scene("compile",
+                                    "condense a scene into the image that trocar-rig runs, and the map from its forces to what is drawn\n"
+                                    "Example: trocar scene compile phantom --out phantom.image",
+                                    compile.scene, "scene name, or path of its TOML file");
+  compile_command->add_option("--out", compile.out, "the image, written anew")->required();
+  auto* visible_option =
+      compile_command->add_option("--visible", compile.visible, "the visible map (default: the image's name and .visible)");
+  compile_command->add_flag("--no-visible", compile.without_visible, "write no visible map")->excludes(visible_option);
+  compile_command->add_option("--memory", compile.memory_gb, "GB that compiling may take")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1e6));
+  compile_command->callback([&] {
+    compile.json = json;
+    code = cli::scene_compile(compile, stop_asked);
+  });
+
   auto* solve_command = app.add_subcommand("solve",
                                            "static finite elements: displacements of a scene's tissue under loads on its nodes\nExample: "
                                            "trocar solve phantom --loads loads.csv --out "
@@ -81,7 +116,6 @@ int main(int argc, char** argv) {
                                            "x_m,y_m,z_m,fx_n,fy_n,fz_n; one node a row, forces on one node add up.\n"
                                            "Results: node,x_m,y_m,ux_m,uy_m, for solids node,x_m,y_m,z_m,ux_m,uy_m,uz_m.");
   host::SolveOptions solve;
-  std::string scene;
   solve_command->add_option("scene", scene, "scene name, or path of its TOML file")->required();
   solve_command->add_option("--loads", solve.loads, "CSV of forces")->required();
   solve_command->add_option("--out", solve.out, "CSV of displacements, written anew")->required();

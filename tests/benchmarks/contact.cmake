@@ -1,5 +1,5 @@
 trocar_library(tests/benchmarks/contact
-  SOURCES course.cpp output.cpp
-  DEPENDS common_contact tests_benchmarks_partner
-  PRIVATE_DEPENDS fmt::fmt host_report)
+  SOURCES course.cpp output.cpp whole_step.cpp
+  DEPENDS common_contact common_insertion common_image_file common_model tests_benchmarks_partner
+  PRIVATE_DEPENDS fmt::fmt host_report common_condense common_scene)
 trocar_program(contact_benchmark SOURCES contact/contact_benchmark.cpp DEPENDS tests_benchmarks_contact fmt::fmt)

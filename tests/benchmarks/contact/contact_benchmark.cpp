@@ -13,6 +13,7 @@
 #include "tests/benchmarks/contact/course.hpp"
 #include "tests/benchmarks/contact/output.hpp"
 #include "tests/benchmarks/contact/timing.hpp"
+#include "tests/benchmarks/contact/whole_step.hpp"
 #include "tests/benchmarks/partner/full_system.hpp"
 #include "tests/benchmarks/partner/sheet.hpp"
 
@@ -63,6 +64,7 @@ class Bench {
   void whole_mesh();
   void sizes();
   void meshes();
+  void skips();
   void errors();
   void finish();
 
@@ -205,29 +207,64 @@ void Bench::sizes() {
 }
 
 void Bench::meshes() {
-  constexpr std::size_t contacts = 14;  // as many as the coarsest mesh has nodes on the needle
+  constexpr std::size_t few = 14;  // as many as the coarsest mesh has nodes on the needle
   std::vector<Row> light;
-  std::vector<std::size_t> sizes;
+  std::vector<std::size_t> nodes_of, contacts_of;
+  std::vector<std::shared_ptr<WholeStep>> steps;
   for (const int side : {21, 32, 45, 71, 100, 150, 224}) {
     const partner::Sheet sheet = partner::make_sheet(side);
+    const std::size_t mesh_nodes = sheet.mesh.node.size();
     std::vector<int> nodes;
-    const Scene scene = scene_on(sheet, contacts, &nodes);
+    const Scene scene = scene_on(sheet, few, &nodes);
     std::vector<Row> rows = whole_mesh_rows("mesh_size", scene, sheet, nodes);
     measure(rows, options_.turns(5));
-    add(rows, contacts, sheet.mesh.node.size());
-    for (int each = 0; each < 2; ++each) sizes.push_back(sheet.mesh.node.size());
-    light.push_back(course_row("mesh_size/ours", std::make_shared<Ours>(scene, Motion::TurnAndAdvance)));
-    light.push_back(course_row("mesh_size/thesis", std::make_shared<Thesis>(scene, Motion::TurnAndAdvance)));
+    add(rows, few, mesh_nodes);
+    const auto light_row = [&](const Row& row, std::size_t contacts) {
+      light.push_back(row);
+      nodes_of.push_back(mesh_nodes);
+      contacts_of.push_back(contacts);
+    };
+    light_row(course_row("mesh_size/ours", std::make_shared<Ours>(scene, Motion::TurnAndAdvance)), few);
+    light_row(course_row("mesh_size/thesis", std::make_shared<Thesis>(scene, Motion::TurnAndAdvance)), few);
+    steps.push_back(std::make_shared<WholeStep>(side, 32, WholeStep::Motion::Turn));
+    light_row(course_row("mesh_size/our_whole_step", steps.back()), 32);
   }
   measure(light, options_.turns(41));
-  double least = light[0].median_s, most = least;
+  std::vector<double> step_s;
   for (std::size_t k = 0; k < light.size(); ++k) {
-    add({light[k]}, contacts, sizes[k]);
-    if (k % 2 == 1) continue;
-    least = std::min(least, light[k].median_s);
-    most = std::max(most, light[k].median_s);
+    add({light[k]}, contacts_of[k], nodes_of[k]);
+    if (contacts_of[k] == 32) step_s.push_back(light[k].median_s);
   }
-  ratios_.push_back({"441 to 50,176 nodes: dearest / cheapest tick", most / least, AtMost, 1.2});
+  const auto [least, most] = std::minmax_element(step_s.begin(), step_s.end());
+  ratios_.push_back({"441 to 50,176 nodes, whole step, 32 contacts: dearest / cheapest", *most / *least, AtMost, 1.2});
+  for (std::size_t k = 0; k < steps.size(); ++k)
+    fmt::print(stderr, "  whole step on {} nodes: {} contacts, {:.0f} % slip\n", nodes_of[3 * k], steps[k]->contacts(),
+               100.0 * steps[k]->slipping());
+}
+
+// What each skip saves: needle outside of the tissue, nothing changed, factor used again. That it changes no result is a test of
+// common/insertion.
+void Bench::skips() {
+  using Motion = WholeStep::Motion;
+  std::vector<Row> rows;
+  const auto row = [&](const char* name, Motion motion, bool skip) {
+    rows.push_back(course_row(name, std::make_shared<WholeStep>(71, 32, motion, skip)));
+  };
+  row("skips/outside", Motion::Outside, true);
+  row("skips/rest", Motion::Rest, true);
+  row("skips/straight", Motion::ToAndFro, true);
+  row("skips/straight_factor_anew", Motion::ToAndFro, false);
+  row("skips/turn", Motion::Turn, true);
+  row("skips/turn_factor_anew", Motion::Turn, false);
+  measure(rows, options_.turns(21));
+  add(rows, 32, 71 * 71);
+  const auto ratio = [&](const char* what, const char* with, const char* without) {
+    ratios_.push_back({what, median("skips", with) / median("skips", without), None, 0.0});
+  };
+  ratio("whole step, needle outside of the tissue / turning", "outside", "turn");
+  ratio("whole step, at rest / turning", "rest", "turn");
+  ratio("whole step, straight: factor reused / anew", "straight", "straight_factor_anew");
+  ratio("whole step, turning: stuck rows of the factor reused / anew", "turn", "turn_factor_anew");
 }
 
 // The exact solution along a course of its own, tick by tick, by the reference.
@@ -331,6 +368,7 @@ int run(int count, char** argument) {
   step("the whole mesh, 10,000 nodes", [&] { bench.whole_mesh(); });
   step("4 to 64 contacts", [&] { bench.sizes(); });
   step("441 to 50,176 nodes", [&] { bench.meshes(); });
+  step("what skipping saves", [&] { bench.skips(); });
   step("errors", [&] { bench.errors(); });
   bench.finish();
   return 0;

@@ -22,14 +22,14 @@ void write_file(const std::filesystem::path& path, const std::string& text) {
 
 constexpr const char* figures = R"(
 set datafile separator ','
-set terminal svg size 800,500 font 'sans,14' background 'white'
+set terminal svg size 900,500 font 'sans,14' background 'white'
 set key outside right top
 set logscale xy
 set grid
 set format '10^{%L}'
 
 set output folder.'/contact_error.svg'
-set title 'Run time against error, 32 contacts, the needle turns to and fro'
+set title 'Run time against error: 32 contacts, turning to and fro'
 set xlabel 'worst error of a contact force [N]'
 set ylabel 'time of a tick [us]'
 csv = folder.'/contact_error.csv'
@@ -37,10 +37,10 @@ methods = 'ours thesis full_refactored full_reused_columns full_reused_iteration
 plot for [m in methods] csv skip 1 using (strcol(1) eq 'turn_to_and_fro' && strcol(2) eq m ? ($3 < 1e-17 ? 1e-17 : $3) : NaN):5 with points pt 7 ps 1.5 title m noenhanced
 
 set output folder.'/contact_size.svg'
-set title 'Cost of a tick against the size of the mesh, 14 contacts, the needle turns'
+set title 'Cost against size: 14 contacts, whole step 32'
 set xlabel 'nodes of the mesh'
 csv = folder.'/contact.csv'
-methods = 'ours thesis full_displacement full_reused_columns full_reused_iterations full_refactored'
+methods = 'ours our_whole_step thesis full_displacement full_reused_columns full_reused_iterations full_refactored'
 plot for [m in methods] csv skip 1 using (strcol(1) eq 'mesh_size' && strcol(2) eq m ? $4 : NaN):5 with points pt 7 title m noenhanced
 )";
 

@@ -10,7 +10,7 @@ constexpr double side_m = 0.1;
 
 }  // namespace
 
-Sheet make_sheet(int nodes_per_side) {
+fem::Tissue sheet_tissue(int nodes_per_side) {
   fem::Tissue tissue;
   tissue.model = fem::Model::PlaneStress;
   tissue.thickness_m = 0.011;
@@ -18,6 +18,11 @@ Sheet make_sheet(int nodes_per_side) {
       fem::uniform_grid(fem::Type::Tri3, {-side_m / 2, -side_m / 2, 0.0}, {side_m, side_m, 0.0}, {nodes_per_side, nodes_per_side, 1});
   tissue.zones.push_back({{25300.0, 0.48}, {}, {}});
   tissue.supports.push_back({fem::Side::YMax, {true, true, false}});
+  return tissue;
+}
+
+Sheet make_sheet(int nodes_per_side) {
+  const fem::Tissue tissue = sheet_tissue(nodes_per_side);
   Sheet sheet;
   sheet.mesh = fem::make_mesh(tissue);
   sheet.statics = std::make_unique<fem::Statics>(sheet.mesh, tissue);

@@ -21,6 +21,7 @@ struct Sheet {
   std::vector<int> row{};                   // of each degree of freedom in `stiffness`, -1 where supported
 };
 
+[[nodiscard]] fem::Tissue sheet_tissue(int nodes_per_side);
 [[nodiscard]] Sheet make_sheet(int nodes_per_side);
 
 // `contacts` nodes at equal steps over `depth_m` below the entry, all of one column, nearest to x = 0. Throws std::runtime_error when

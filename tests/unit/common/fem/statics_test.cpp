@@ -140,6 +140,19 @@ TEST_P(EachKind, ColumnsEqualSingleSolutionsInBlocksOfAnySize) {
     Eigen::MatrixXd again = found;
     statics.solve_columns(loads, block_size, [&](Eigen::Index first, const auto& u) { again.middleCols(first, u.cols()) = u; });
     EXPECT_EQ(again, found) << "not repeatable, block " << block_size;
+
+    // A few rows alone: the same bits there, nothing elsewhere.
+    std::vector<bool> wanted(static_cast<std::size_t>(size), false);
+    for (std::size_t i = 0; i < wanted.size(); i += 11) wanted[i] = true;
+    again.setConstant(std::nan(""));
+    statics.solve_columns(loads, block_size, wanted, [&](Eigen::Index first, const auto& u) { again.middleCols(first, u.cols()) = u; });
+    for (Eigen::Index i = 0; i < size; ++i) {
+      if (wanted[static_cast<std::size_t>(i)]) {
+        EXPECT_EQ(again.row(i), found.row(i));
+      } else {
+        EXPECT_TRUE((again.row(i).array() == 0.0).all());
+      }
+    }
   }
 }
 

@@ -5,14 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <random>
 
+#include "cases.hpp"
 #include "common/fem/statics.hpp"
 #include "models.hpp"
 
 namespace trocar::fem {
 namespace {
 
+using element::Random;
 using testing::block;
 using testing::distorted;
 using testing::message_of;
@@ -82,15 +83,6 @@ double expect_chain(const Mesh& mesh, const std::vector<int>& path, const Point&
   }
   return off;
 }
-
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  double operator()(double from, double to) { return from + (to - from) * static_cast<double>(engine_()) / 4294967295.0; }
-
- private:
-  std::mt19937 engine_;
-};
 
 TEST(Subdivide, BisectsAnEdgeBetweenTwoTriangles) {
   Mesh mesh = structured_grid(uniform_grid(Type::Tri3, {0, 0, 0}, {1, 1, 0}, {2, 2, 1}));  // diagonal from node 0 to node 3

@@ -85,7 +85,7 @@ TEST(Plant, SensorTurnsWithTheNeedle) {
   for (const double angle : {0.0, 0.7}) {
     rig::Rig rig = shipped_rig();
     rig.sensor.angle_rad = angle;
-    Plant plant(rig, perfect(), shipped_phantom(), 1);
+    Plant plant(rig, perfect(), shipped_scene(), 1);
     // A hand pushes the needle sideways into the tissue: the base carries what the phantom answers.
     plant.set_hand_wrench({0.3, 3.0, 0.002});
     plant.advance_to(300 * millisecond, {});
@@ -134,11 +134,11 @@ std::array<double, 3> insertion(double time_s) { return {0.0, 0.11 + 0.008 * tim
 TEST(Plant, InsertionLoadsMotorsSensorAndMechanismAlike) {
   Machine m;
   m.follow(5.0, insertion);
-  const double path = m.plant.phantom().path_m();
+  const double path = m.plant.phantom().insertion().working_set().path_m();
   EXPECT_GT(path, 0.025);
   EXPECT_LT(path, 0.036);
   const double base = m.plant.base_wrench()[1];
-  EXPECT_NEAR(base, m.plant.phantom().shaft_density_n_per_m() * path, 0.05);
+  EXPECT_NEAR(base, m.plant.phantom().insertion().shaft_n_per_m() * path, 0.05);
   EXPECT_NEAR(m.plant.sensor_wrench()[0], base, 5 * 0.0125);  // along the needle
   EXPECT_NEAR(m.plant.velocity()[1], 0.008, 0.002);
   EXPECT_EQ(m.plant.phantom().counters().unconverged, 0u);
@@ -182,7 +182,8 @@ TEST(Plant, HalvingTheStepChangesTheMotionLittle) {
   for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(pose[0][i], pose[2][i], 2e-6);
   EXPECT_NEAR(pose[0][2], pose[2][2], 2e-5);
   EXPECT_NEAR(force[0], force[2], 2e-3);
-  EXPECT_LT(std::abs(pose[1][1] - pose[2][1]), 0.6 * std::abs(pose[0][1] - pose[2][1]) + 1e-9);
+  // Down to the steps in which the last contact's ties follow the tip: some ten nanometres here.
+  EXPECT_LT(std::abs(pose[1][1] - pose[2][1]), 0.6 * std::abs(pose[0][1] - pose[2][1]) + 2e-8);
 }
 
 TEST(Plant, WithdrawalReversesTheForceAndEndsWithoutContact) {
@@ -234,7 +235,7 @@ TEST(Plant, SurvivesFullTorqueInEveryDirection) {
 
 std::string refusal(const rig::Rig& rig, const PlantConfig& config) {
   try {
-    const Plant plant(rig, config, shipped_phantom(), 1);
+    const Plant plant(rig, config, shipped_scene(), 1);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
