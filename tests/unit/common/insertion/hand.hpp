@@ -101,6 +101,7 @@ class Hand {
 struct Balance {
   double wrench{};      // largest difference in N, and in N m over the needle's length
   double off_axis_m{};  // farthest that a contact's tissue lies from the needle's axis
+  double stretch_m{};   // most that a tie gives way by regularisation, the last segment's apart
 };
 
 // The contact forces on the nodes of the whole sparse mesh (as adapted): the displacements that these cause say where the contacts
