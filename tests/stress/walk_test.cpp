@@ -164,7 +164,7 @@ TEST(WalkStress, WithExplicitContactsANanometreApart) {
     ASSERT_LE(result.residual_n, contact::Solver::tolerance_n);
     ASSERT_LE(breach_n(*model, law), 2e-9);
   }
-  EXPECT_LE(unsolved, ticks / 5'000);
+  EXPECT_LE(unsolved, ticks / 1'000);
   EXPECT_EQ(model->working_set().solver().factor_drift(), 0.0);
 }
 
