@@ -14,7 +14,8 @@
 //   [[tissue.material]] young_pa, poisson, (box = [[x0, y0(, z0)], [x1, y1(, z1)]]), (region = "name")
 //     later entries override earlier ones
 //   [[tissue.support]] where = "x_min" … "z_max" | "group", or box; fix = ["x", "y", "z"]
-//   [needle] model = "rigid" | "beam" | "thesis", length_m, gauge = "22G" or outer_m, inner_m, young_pa (a rigid one needs none), (elements)
+//   [needle] model = "rigid" | "beam" | "thesis", length_m, gauge = "22G" or outer_m, inner_m, young_pa (a rigid one needs none),
+//     (elements)
 //   [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m,
 //     (velocity_law = "none" or a name below),
 //     (spacing_m: of embedded contacts, 1.5 edges unless stated),
