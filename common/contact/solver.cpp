@@ -7,12 +7,17 @@
 namespace trocar::contact {
 namespace {
 
-constexpr double inner_tolerance_n = 1e-11;   // aimed at, so that the promised one holds with room for rounding
+constexpr double inner_tolerance_n = 1e-11;  // aimed at, so that the promised one holds with room for rounding
+// Contacts that hardly differ carry huge opposite forces across the shaft; what rounding leaves of these is no violation. In units of the
+// largest force's last digit, and never near to the promised residual.
+constexpr double rounding_digits = 4.0 * std::numeric_limits<double>::epsilon();
+constexpr double largest_inner_tolerance_n = 0.3 * Solver::tolerance_n;
 constexpr double settled_n = 1e-13;           // at or below, the last forces are the solution of this tick too
 constexpr double largest_slip_start_n = 1e6;  // a contact that would begin by slipping under more begins stuck
 constexpr int most_refinements = 3;
-constexpr int block_patience = 3;  // block exchanges without improvement before single ones
-// Smallest square of a pivot over the diagonal of M: below, the unknown is as good as dependent on those before it.
+constexpr int block_patience = 3;  // block exchanges without fewer violations
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// Smallest pivot over the diagonal of M: below, the unknown is as good as dependent on those before it.
 constexpr double smallest_pivot = 1e-15;
 
 double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
@@ -22,39 +27,56 @@ double quadratic(const Block& g, const Vector2& v) noexcept {
 }
 bool slipping(State state) noexcept { return state != State::Stuck; }
 
-// y[begin, end) -= x0 a0 + x1 a1 + x2 a2 + x3 a3
-void subtract(double* __restrict y, std::size_t begin, std::size_t end, const double* __restrict a0, const double* __restrict a1,
-              const double* __restrict a2, const double* __restrict a3, double x0, double x1, double x2, double x3) noexcept {
-  for (std::size_t r = begin; r < end; ++r) y[r] -= (x0 * a0[r] + x1 * a1[r]) + (x2 * a2[r] + x3 * a3[r]);
+// y[0, rows) -= x_0 a_0 + x_1 a_1 + … over `count` columns a_l, `stride` apart: four columns at a time, then the rest one by one, whatever
+// the number of rows. The sums stay in registers.
+template <std::size_t rows>
+void subtract(double* y, const double* a, std::size_t stride, const double* x, std::size_t count) noexcept {
+  std::array<double, rows> sum;
+  for (std::size_t r = 0; r < rows; ++r) sum[r] = y[r];
+  for (std::size_t k = 0; k < count / 4; ++k, x += 4, a += 4 * stride)
+    for (std::size_t r = 0; r < rows; ++r)
+      sum[r] -= (x[0] * a[r] + x[1] * a[stride + r]) + (x[2] * a[2 * stride + r] + x[3] * a[3 * stride + r]);
+  for (std::size_t k = 0; k < count % 4; ++k, ++x, a += stride)
+    for (std::size_t r = 0; r < rows; ++r) sum[r] -= *x * a[r];
+  for (std::size_t r = 0; r < rows; ++r) y[r] = sum[r];
 }
-void subtract(double* __restrict y, std::size_t begin, std::size_t end, const double* __restrict a, double x) noexcept {
-  for (std::size_t r = begin; r < end; ++r) y[r] -= x * a[r];
+// The same for y[begin, end), rounded up to a multiple of 4 rows.
+void subtract(double* y, std::size_t begin, std::size_t end, const double* a, std::size_t stride, const double* x,
+              std::size_t count) noexcept {
+  std::size_t r = begin;
+  for (; r + 12 < end; r += 16) subtract<16>(y + r, a + r, stride, x, count);
+  for (; r + 4 < end; r += 8) subtract<8>(y + r, a + r, stride, x, count);
+  if (r < end) subtract<4>(y + r, a + r, stride, x, count);
+}
+
+// x_0 a_0 + x_1 a_1 + … over the rows a_k
+template <std::size_t n>
+std::array<double, n> times(const std::array<std::array<double, n>, n>& a, const double* x) noexcept {
+  std::array<double, n> even{}, odd{};
+  for (std::size_t k = 0; k < n; k += 2)
+    for (std::size_t r = 0; r < n; ++r) even[r] += x[k] * a[k][r], odd[r] += x[k + 1] * a[k + 1][r];
+  for (std::size_t r = 0; r < n; ++r) even[r] += odd[r];
+  return even;
 }
 
 }  // namespace
 
 Vector2 Solver::direction(const Unknown& unknown) const noexcept {
-  switch (unknown.direction) {
-    case Direction::X:
-      return {1.0, 0.0};
-    case Direction::Y:
-      return {0.0, 1.0};
-    case Direction::Normal:
-      break;
-  }
-  return normal(tangent_[unknown.contact]);
+  if (unknown.direction == Direction::X) return {1.0, 0.0};
+  if (unknown.direction == Direction::Y) return {0.0, 1.0};
+  return {-tangent_y_[unknown.contact], tangent_x_[unknown.contact]};
 }
 
 void Solver::set_row(std::size_t i, std::span<const Block> row) noexcept {
   for (std::size_t j = 0; j <= i; ++j) {
     const Block& b = row[j];
-    compliance_[2 * j][2 * i] = compliance_[2 * i][2 * j] = b[0];
-    compliance_[2 * j + 1][2 * i] = compliance_[2 * i][2 * j + 1] = b[1];
-    compliance_[2 * j][2 * i + 1] = compliance_[2 * i + 1][2 * j] = b[2];
-    compliance_[2 * j + 1][2 * i + 1] = compliance_[2 * i + 1][2 * j + 1] = b[3];
+    compliance_[2 * j][i] = compliance_[2 * i][j] = b[0];
+    compliance_[2 * j + 1][i] = compliance_[2 * i][half + j] = b[1];
+    compliance_[2 * j][half + i] = compliance_[2 * i + 1][j] = b[2];
+    compliance_[2 * j + 1][half + i] = compliance_[2 * i + 1][half + j] = b[3];
   }
   // The own block is symmetric to the bit.
-  compliance_[2 * i][2 * i + 1] = compliance_[2 * i + 1][2 * i];
+  compliance_[2 * i + 1][i] = compliance_[2 * i][half + i];
   evaluated_ = false;
 }
 
@@ -93,8 +115,9 @@ void Solver::push(std::span<const Block> row) noexcept {
   const std::size_t i = size_++;
   set_row(i, row);
   contact_[i] = {};
-  tangent_[i] = {1.0, 0.0};
-  force_[2 * i] = force_[2 * i + 1] = 0.0;
+  tangent_x_[i] = 1.0;
+  tangent_y_[i] = 0.0;
+  put_force(i);
   enter(i);
 }
 
@@ -107,9 +130,9 @@ void Solver::replace(std::size_t i, std::span<const Block> row) noexcept {
 void Solver::replace_own(std::size_t i, const Block& own) noexcept {
   const Block now = compliance(i, i);
   if (now[0] == own[0] && now[1] == own[1] && now[3] == own[3]) return;
-  compliance_[2 * i][2 * i] = own[0];
-  compliance_[2 * i][2 * i + 1] = compliance_[2 * i + 1][2 * i] = own[1];
-  compliance_[2 * i + 1][2 * i + 1] = own[3];
+  compliance_[2 * i][i] = own[0];
+  compliance_[2 * i][half + i] = compliance_[2 * i + 1][i] = own[1];
+  compliance_[2 * i + 1][half + i] = own[3];
   evaluated_ = false;
   withdraw(i);
   enter(i);
@@ -119,8 +142,6 @@ void Solver::pop() noexcept {
   --size_;
   withdraw(size_);
   evaluated_ = false;
-  // Loops over rows run in whole vectors: what lies behind the end must stay harmless.
-  for (std::size_t k = 0; k < 2; ++k) force_[2 * size_ + k] = 0.0;
 }
 
 void Solver::clear() noexcept {
@@ -128,17 +149,30 @@ void Solver::clear() noexcept {
   evaluated_ = false;
 }
 
-void Solver::set_axial(std::size_t i, double axial_n) noexcept {
-  Contact& c = contact_[i];
-  const double change = axial_n - c.axial_n;
-  if (change == 0.0) return;
-  c.axial_n = axial_n;
-  const Vector2 t = tangent_[i];
-  const Vector2 n = normal(t);
-  c.force_n = {axial_n * t[0] + c.lateral_n * n[0], axial_n * t[1] + c.lateral_n * n[1]};
-  force_[2 * i] = c.force_n[0];
-  force_[2 * i + 1] = c.force_n[1];
+void Solver::put_force(std::size_t i) noexcept {
+  reaction_[2 * i] = -contact_[i].force_n[0];
+  reaction_[2 * i + 1] = -contact_[i].force_n[1];
   evaluated_ = false;
+}
+
+void Solver::compose_force(std::size_t i, double axial_n, double lateral_n) noexcept {
+  Contact& c = contact_[i];
+  const double tx = tangent_x_[i], ty = tangent_y_[i];
+  c.axial_n = axial_n, c.lateral_n = lateral_n;
+  c.force_n = {axial_n * tx - lateral_n * ty, axial_n * ty + lateral_n * tx};
+  put_force(i);
+}
+
+void Solver::resolve_force(std::size_t i) noexcept {
+  Contact& c = contact_[i];
+  const Vector2 t{tangent_x_[i], tangent_y_[i]};
+  c.axial_n = dot(c.force_n, t);
+  c.lateral_n = dot(c.force_n, normal(t));
+}
+
+void Solver::set_axial(std::size_t i, double axial_n) noexcept {
+  if (contact_[i].axial_n == axial_n) return;
+  compose_force(i, axial_n, contact_[i].lateral_n);
 }
 
 // Takes the tick's frames and bounds: a slipping contact keeps its lateral force in the turned frame and sits on its bound.
@@ -153,19 +187,15 @@ void Solver::turn(std::span<const Target> target) noexcept {
     } else if (now.lower_n == now.upper_n) {
       set_state(i, State::SlipForward);
     }
-    if (tangent_[i] != now.tangent) {
-      tangent_[i] = now.tangent;
+    if (tangent_x_[i] != now.tangent[0] || tangent_y_[i] != now.tangent[1]) {
+      tangent_x_[i] = now.tangent[0];
+      tangent_y_[i] = now.tangent[1];
       if (slipping(c.state)) {
-        const Vector2 n = normal(now.tangent);
-        c.force_n = {c.axial_n * now.tangent[0] + c.lateral_n * n[0], c.axial_n * now.tangent[1] + c.lateral_n * n[1]};
-        force_[2 * i] = c.force_n[0];
-        force_[2 * i + 1] = c.force_n[1];
-        evaluated_ = false;
+        compose_force(i, c.axial_n, c.lateral_n);
         for (std::size_t k = 0; k < first_turned; ++k)
           if (order_[k].contact == i) first_turned = k;
       } else {
-        c.axial_n = dot(c.force_n, now.tangent);
-        c.lateral_n = dot(c.force_n, normal(now.tangent));
+        resolve_force(i);
       }
     }
     if (slipping(c.state)) set_axial(i, c.state == State::SlipForward ? now.upper_n : now.lower_n);
@@ -173,60 +203,54 @@ void Solver::turn(std::span<const Target> target) noexcept {
   // Stuck contacts first: their rows outlive the next turn. From the first turned one on, whatever the factor holds: the order, and with it
   // every bit, must not depend on what was skipped. (A change of state above can only have cut the factor before a shifted place.)
   valid_ = std::min(valid_, first_turned);
-  if (first_turned < unknowns_) {
-    std::array<Unknown, 2 * capacity> slipping_ones;
-    std::size_t kept = first_turned;
-    std::size_t put_off = 0;
-    for (std::size_t k = first_turned; k < unknowns_; ++k) {
-      if (order_[k].direction == Direction::Normal)
-        slipping_ones[put_off++] = order_[k];
-      else
-        order_[kept++] = order_[k];
-    }
-    std::copy_n(slipping_ones.begin(), put_off, order_.begin() + static_cast<std::ptrdiff_t>(kept));
+  if (first_turned == unknowns_) return;
+  std::array<Unknown, 2 * capacity> slipping_ones;
+  std::size_t kept = first_turned;
+  std::size_t put_off = 0;
+  for (std::size_t k = first_turned; k < unknowns_; ++k) {
+    if (order_[k].direction == Direction::Normal)
+      slipping_ones[put_off++] = order_[k];
+    else
+      order_[kept++] = order_[k];
   }
+  std::copy_n(slipping_ones.begin(), put_off, order_.begin() + static_cast<std::ptrdiff_t>(kept));
 }
 
 void Solver::evaluate() noexcept {
   if (evaluated_) return;
-  const std::size_t rows = 2 * size_;
-  double* __restrict u = displacement_.data();
-  for (std::size_t r = 0; r < rows; ++r) u[r] = 0.0;
-  std::size_t j = 0;
-  for (; j + 4 <= rows; j += 4) {
-    const double* __restrict a0 = compliance_[j].data();
-    const double* __restrict a1 = compliance_[j + 1].data();
-    const double* __restrict a2 = compliance_[j + 2].data();
-    const double* __restrict a3 = compliance_[j + 3].data();
-    const double x0 = force_[j];
-    const double x1 = force_[j + 1];
-    const double x2 = force_[j + 2];
-    const double x3 = force_[j + 3];
-    for (std::size_t r = 0; r < rows; ++r) u[r] += (x0 * a0[r] + x1 * a1[r]) + (x2 * a2[r] + x3 * a3[r]);
-  }
-  for (; j < rows; ++j) {
-    const double* __restrict a = compliance_[j].data();
-    const double x = force_[j];
-    for (std::size_t r = 0; r < rows; ++r) u[r] += x * a[r];
-  }
+  displacement_.fill(0.0);
+  for (const std::size_t begin : {std::size_t{0}, half})
+    subtract(displacement_.data(), begin, begin + size_, compliance_[0].data(), stride, reaction_.data(), 2 * size_);
   evaluated_ = true;
 }
 
 // Entries of M in rows first … unknowns_ - 1, up to the diagonal, in the place of L.
 void Solver::assemble_rows(std::size_t first) noexcept {
-  const std::size_t rows = 2 * size_;
-  double* __restrict w = work_.data();
-  for (std::size_t a = first; a < unknowns_; ++a) {
+  // Of M's row a: the products with x, with y and with the normal of every contact, one third each.
+  alignas(64) std::array<double, 3 * half> row;
+  std::array<std::uint16_t, 2 * capacity> place;
+  double* __restrict x = row.data();
+  double* __restrict y = x + half;
+  double* __restrict n = y + half;
+  const double* __restrict tx = tangent_x_.data();
+  const double* __restrict ty = tangent_y_.data();
+  std::size_t contacts = 0;  // up to the last one so far, in whole vectors
+  for (std::size_t a = 0; a < unknowns_; ++a) {
+    const std::size_t i = order_[a].contact;
+    place[a] = static_cast<std::uint16_t>(i + half * static_cast<std::size_t>(order_[a].direction));
+    contacts = std::max(contacts, (i + 4) / 4 * 4);
+    if (a < first) continue;
     const Vector2 v = direction(order_[a]);
-    const double* __restrict gx = compliance_[2 * std::size_t{order_[a].contact}].data();
-    const double* __restrict gy = compliance_[2 * std::size_t{order_[a].contact} + 1].data();
-    for (std::size_t r = 0; r < rows; ++r) w[r] = v[0] * gx[r] + v[1] * gy[r];
-    for (std::size_t b = 0; b <= a; ++b) {
-      const Vector2 t = direction(order_[b]);
-      const std::size_t i = 2 * std::size_t{order_[b].contact};
-      factor_[b][a] = t[0] * w[i] + t[1] * w[i + 1];
+    const double* __restrict gx = compliance_[2 * i].data();
+    const double* __restrict gy = compliance_[2 * i + 1].data();
+    for (std::size_t r = 0; r < contacts; ++r) {
+      x[r] = v[0] * gx[r] + v[1] * gy[r];
+      y[r] = v[0] * gx[half + r] + v[1] * gy[half + r];
+      n[r] = tx[r] * y[r] - ty[r] * x[r];
     }
+    for (std::size_t b = 0; b <= a; ++b) factor_[b][a] = row[place[b]];
   }
+  for (std::size_t b = 0; b < unknowns_; ++b) std::fill_n(&factor_[b][unknowns_], 3, 0.0);  // sweeps run over them
 }
 
 int Solver::factorise() noexcept {
@@ -235,72 +259,91 @@ int Solver::factorise() noexcept {
   if (first >= end) return 0;
   assemble_rows(first);
   for (std::size_t j = 0; j < end; ++j) {
-    const std::size_t begin = std::max(j, first);
-    double* __restrict column = factor_[j].data();
+    double* column = factor_[j].data();
     // The mirror: L_jl, l < j, stands above the diagonal of this column.
     const double diagonal = column[j];
-    std::size_t l = 0;
-    for (; l + 4 <= j; l += 4)
-      subtract(column, begin, end, factor_[l].data(), factor_[l + 1].data(), factor_[l + 2].data(), factor_[l + 3].data(), column[l],
-               column[l + 1], column[l + 2], column[l + 3]);
-    for (; l < j; ++l) subtract(column, begin, end, factor_[l].data(), column[l]);
+    subtract(column, std::max(j, first), end, factor_[0].data(), stride, column, j);
     if (j >= first) {
-      const double pivot = std::max(column[j], smallest_pivot * std::abs(diagonal) + std::numeric_limits<double>::min());
-      column[j] = std::sqrt(pivot);
+      column[j] = std::max(column[j], smallest_pivot * std::abs(diagonal) + std::numeric_limits<double>::min());
       inverse_pivot_[j] = 1.0 / column[j];
     }
     const double inverse = inverse_pivot_[j];
-    for (std::size_t r = std::max(j + 1, first); r < end; ++r) column[r] *= inverse;
-    for (std::size_t r = std::max(j + 1, first); r < end; ++r) factor_[r][j] = column[r];
+    for (std::size_t r = std::max(j + 1, first); r < end; ++r) factor_[r][j] = column[r] * inverse;
   }
   valid_ = end;
+  for (std::size_t j = first / block * block; j < end; j += block) invert_block(j);
   return static_cast<int>(end - first);
 }
 
-// One correction of the working unknowns by L L^T x = v.(d - u).
-void Solver::solve_unknowns(std::span<const Target> target) noexcept {
-  double* __restrict y = work_.data();
-  for (std::size_t a = 0; a < unknowns_; ++a) {
-    const std::size_t i = order_[a].contact;
-    const Vector2 gap{target[i].gap_m[0] - displacement_[2 * i], target[i].gap_m[1] - displacement_[2 * i + 1]};
-    y[a] = dot(direction(order_[a]), gap);
+// The inverse of L's diagonal block from row j on, row by row: N_r = e_r - sum over l < r of L_rl N_l.
+void Solver::invert_block(std::size_t j) noexcept {
+  for (std::size_t r = unknowns_; r < j + block; ++r) std::fill_n(&factor_[r][j], block, 0.0);
+  BlockInverse& inverse = block_inverse_[j / block];
+  std::array<std::array<double, block>, block> n{};
+#pragma GCC unroll 8
+  for (std::size_t r = 0; r < block; ++r) {
+    n[r][r] = 1.0;
+#pragma GCC unroll 8
+    for (std::size_t l = 0; l < r; ++l)
+      for (std::size_t k = 0; k < block; ++k) n[r][k] -= factor_[j + r][j + l] * n[l][k];
   }
-  for (std::size_t j = 0; j < unknowns_; ++j) {
-    y[j] *= inverse_pivot_[j];
-    subtract(y, j + 1, unknowns_, factor_[j].data(), y[j]);
-  }
-  for (std::size_t j = unknowns_; j-- > 0;) {
-    y[j] *= inverse_pivot_[j];
-    subtract(y, 0, j, factor_[j].data(), y[j]);
-  }
-  for (std::size_t a = 0; a < unknowns_; ++a) {
-    const std::size_t i = order_[a].contact;
-    Contact& c = contact_[i];
-    if (order_[a].direction == Direction::Normal) {
-      const Vector2 t = tangent_[i];
-      const Vector2 n = normal(t);
-      c.lateral_n += y[a];
-      c.force_n = {c.axial_n * t[0] + c.lateral_n * n[0], c.axial_n * t[1] + c.lateral_n * n[1]};
-    } else {
-      c.force_n[order_[a].direction == Direction::X ? 0 : 1] += y[a];
-      c.axial_n = dot(c.force_n, tangent_[i]);
-      c.lateral_n = dot(c.force_n, normal(tangent_[i]));
-    }
-    force_[2 * i] = c.force_n[0];
-    force_[2 * i + 1] = c.force_n[1];
-  }
-  evaluated_ = false;
+  inverse.by_row = n;
+  for (std::size_t r = 0; r < block; ++r)
+    for (std::size_t k = 0; k < block; ++k) inverse.by_column[k][r] = n[r][k];
 }
 
-void Solver::judge(std::span<const Target> target, Violations& v) noexcept {
+// One correction of the working unknowns by L D L^T x = v.(d - u).
+void Solver::solve_unknowns(std::span<const Target> target) noexcept {
+  double* y = unknown_.data();
+  const std::size_t end = unknowns_;
+  if (end == 0) return;
+  for (std::size_t a = 0; a < end; ++a) {
+    const std::size_t i = order_[a].contact;
+    const Vector2 gap{target[i].gap_m[0] - displacement_[i], target[i].gap_m[1] - displacement_[half + i]};
+    y[a] = dot(direction(order_[a]), gap);
+  }
+  // By blocks of unknowns: inside of a block the inverse of its part of L, what it does to the others is one sweep over its columns.
+  // Forwards z = D^-1 L^-1 y, backwards x = L^-T z, both in place.
+  for (std::size_t j = 0; j < end; j += block) {
+    std::array<double, block> z = times(block_inverse_[j / block].by_column, y + j);
+    for (std::size_t r = 0; r < block; ++r) y[j + r] = z[r] * inverse_pivot_[j + r];
+    subtract(y, j + block, end, factor_[j].data(), stride, y + j, block);
+  }
+  const std::size_t blocks = (end + block - 1) / block;
+  std::fill(y + end, y + block * blocks, 0.0);
+  std::size_t count = end - block * (blocks - 1);
+  for (std::size_t b = blocks; b-- > 0;) {
+    const std::size_t j = block * b;
+    const std::array<double, block> x = times(block_inverse_[b].by_row, y + j);
+    std::copy_n(x.begin(), block, y + j);
+    subtract(y, 0, j, factor_[j].data(), stride, y + j, count);
+    count = block;
+  }
+  for (std::size_t a = 0; a < end; ++a) {
+    const std::size_t i = order_[a].contact;
+    if (order_[a].direction == Direction::Normal) {
+      compose_force(i, contact_[i].axial_n, contact_[i].lateral_n + y[a]);
+    } else {
+      contact_[i].force_n[order_[a].direction == Direction::X ? 0 : 1] += y[a];
+      resolve_force(i);
+      put_force(i);
+    }
+  }
+}
+
+void Solver::judge(std::span<const Target> target, double enough_n, Violations& v) noexcept {
   v.count = 0;
   v.free_residual_n = v.residual_n = 0.0;
-  for (std::size_t i = 0; i < size_; ++i) {
+  double largest_force_n = 0.0;
+  for (std::size_t k = 0; k < 2 * size_; ++k) largest_force_n = std::max(largest_force_n, std::abs(reaction_[k]));
+  const double least_n = std::clamp(rounding_digits * largest_force_n, inner_tolerance_n, largest_inner_tolerance_n);
+  v.tolerance_n = least_n;
+  for (std::size_t i = 0; i < size_ && v.residual_n <= enough_n; ++i) {
     Contact& c = contact_[i];
     const Target& at = target[i];
-    const Vector2 t = tangent_[i];
+    const Vector2 t{tangent_x_[i], tangent_y_[i]};
     const Vector2 n = normal(t);
-    const Vector2 gap{at.gap_m[0] - displacement_[2 * i], at.gap_m[1] - displacement_[2 * i + 1]};
+    const Vector2 gap{at.gap_m[0] - displacement_[i], at.gap_m[1] - displacement_[half + i]};
     const Block own = compliance(i, i);
     c.slip_m = dot(t, gap);
     const double axial_gap_n = c.slip_m / quadratic(own, t);
@@ -313,11 +356,11 @@ void Solver::judge(std::span<const Target> target, Violations& v) noexcept {
       v.residual_n = v.free_residual_n = std::numeric_limits<double>::infinity();
     State becomes = c.state;
     if (c.state == State::Stuck) {
-      if (c.axial_n > at.upper_n + inner_tolerance_n) becomes = State::SlipForward;
-      if (c.axial_n < at.lower_n - inner_tolerance_n) becomes = State::SlipBackward;
+      if (c.axial_n > at.upper_n + least_n) becomes = State::SlipForward;
+      if (c.axial_n < at.lower_n - least_n) becomes = State::SlipBackward;
     } else if (at.lower_n == at.upper_n) {
       c.state = becomes = c.slip_m >= 0.0 ? State::SlipForward : State::SlipBackward;
-    } else if (c.state == State::SlipForward ? axial_gap_n < -inner_tolerance_n : axial_gap_n > inner_tolerance_n) {
+    } else if (c.state == State::SlipForward ? axial_gap_n < -least_n : axial_gap_n > least_n) {
       becomes = State::Stuck;
     }
     if (becomes != c.state) {
@@ -328,8 +371,112 @@ void Solver::judge(std::span<const Target> target, Violations& v) noexcept {
   }
 }
 
+// The working unknowns of the present states, refined to the floor of rounding.
+void Solver::correct(std::span<const Target> target, Violations& v, Solution& solution) noexcept {
+  solution.rows_factored += factorise();
+  double unrefined_n = infinity;
+  for (int k = 0; k <= most_refinements && solution.iterations < max_iterations; ++k) {
+    solve_unknowns(target);
+    evaluate();
+    judge(target, infinity, v);
+    ++solution.iterations;
+    if (v.free_residual_n <= v.tolerance_n || v.free_residual_n > 0.5 * unrefined_n) break;
+    unrefined_n = v.free_residual_n;
+  }
+}
+
+// Block principal pivoting: all violations change state at once. False when their number stops falling.
+bool Solver::exchange(std::span<const Target> target, Violations& v, Solution& solution) noexcept {
+  int fewest = static_cast<int>(size_) + 1;
+  int patience = block_patience;
+  while (solution.iterations < max_exchanges) {
+    correct(target, v, solution);
+    if (v.count == 0) return true;
+    if (v.count < fewest) {
+      fewest = v.count;
+      patience = block_patience;
+    } else if (patience-- == 0) {
+      return false;
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(v.count); ++k) {
+      const std::size_t i = v.contact[k];
+      set_state(i, v.becomes[k]);
+      if (slipping(v.becomes[k])) set_axial(i, v.becomes[k] == State::SlipForward ? target[i].upper_n : target[i].lower_n);
+    }
+    solution.pivots += v.count;
+    evaluate();
+  }
+  return false;
+}
+
+// Primal active set: from forces within their bounds towards the solution of the present states, up to the first bound in the way. The
+// energy falls with every step, so no set of states comes twice.
+bool Solver::descend(std::span<const Target> target, Violations& v, Solution& solution) noexcept {
+  cut_to_bounds(target);
+  evaluate();
+  while (solution.iterations < max_iterations) {
+    const std::array<Contact, capacity> before = contact_;
+    correct(target, v, solution);
+    if (!stop_at_bound(target, before, v.tolerance_n)) {
+      if (v.count == 0) return true;
+      release_worst(target, v);
+    }
+    ++solution.pivots;
+    ++solution.descents;
+    evaluate();
+  }
+  return false;
+}
+
+// A stuck contact that is cut to its bound slips: its owner has to know.
+void Solver::cut_to_bounds(std::span<const Target> target) noexcept {
+  for (std::size_t i = 0; i < size_; ++i) {
+    const double axial_n = contact_[i].axial_n;
+    if (contact_[i].state == State::Stuck && axial_n > target[i].upper_n) set_state(i, State::SlipForward);
+    if (contact_[i].state == State::Stuck && axial_n < target[i].lower_n) set_state(i, State::SlipBackward);
+    set_axial(i, std::clamp(axial_n, target[i].lower_n, target[i].upper_n));
+  }
+}
+
+bool Solver::stop_at_bound(std::span<const Target> target, const std::array<Contact, capacity>& before, double least_n) noexcept {
+  double step = 1.0;
+  std::size_t blocking = size_;
+  for (std::size_t i = 0; i < size_; ++i) {
+    const double axial_n = contact_[i].axial_n;
+    if (contact_[i].state != State::Stuck || std::abs(axial_n - std::clamp(axial_n, target[i].lower_n, target[i].upper_n)) <= least_n)
+      continue;
+    const double bound_n = axial_n > target[i].upper_n ? target[i].upper_n : target[i].lower_n;
+    const double share = std::clamp((bound_n - before[i].axial_n) / (axial_n - before[i].axial_n), 0.0, 1.0);
+    if (share < step || blocking == size_) {
+      step = share;
+      blocking = i;
+    }
+  }
+  if (blocking == size_) return false;
+  for (std::size_t i = 0; i < size_; ++i)
+    compose_force(i, std::lerp(before[i].axial_n, contact_[i].axial_n, step), std::lerp(before[i].lateral_n, contact_[i].lateral_n, step));
+  const bool above = contact_[blocking].axial_n > 0.5 * (target[blocking].lower_n + target[blocking].upper_n);
+  set_state(blocking, above ? State::SlipForward : State::SlipBackward);
+  set_axial(blocking, above ? target[blocking].upper_n : target[blocking].lower_n);
+  return true;
+}
+
+// Of the contacts that slip against their friction, the one with the largest force to gain sticks.
+void Solver::release_worst(std::span<const Target> target, const Violations& v) noexcept {
+  std::size_t worst = 0;
+  double most_n = -1.0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(v.count); ++k) {
+    const std::size_t i = v.contact[k];
+    const double gain_n = std::abs(contact_[i].slip_m) / quadratic(compliance(i, i), target[i].tangent);
+    if (v.becomes[k] == State::Stuck && gain_n > most_n) {
+      most_n = gain_n;
+      worst = i;
+    }
+  }
+  if (most_n >= 0.0) set_state(worst, State::Stuck);
+}
+
 Solution Solver::solve(std::span<const Target> target) noexcept {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   Solution solution;
   for (std::size_t i = 0; i < size_; ++i) {
     const Target& t = target[i];
@@ -346,63 +493,22 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
   Violations v;
   turn(target);
   evaluate();
-  judge(target, v);
-  int fewest = static_cast<int>(size_) + 1;
-  int patience = block_patience;
-  int refinements = 0;
-  bool limited = false;
-  while (v.count > 0 || v.residual_n > settled_n) {
-    if (solution.iterations == max_iterations || solution.pivots >= max_pivots) {
-      limited = true;
-      break;
-    }
-    solution.rows_factored += factorise();
-    solve_unknowns(target);
-    evaluate();
-    judge(target, v);
-    ++solution.iterations;
-    if (v.free_residual_n > inner_tolerance_n && refinements < most_refinements) {
-      ++refinements;
-      continue;
-    }
-    refinements = 0;
-    if (v.count == 0) break;
-    std::size_t begin = 0;
-    if (v.count < fewest) {
-      fewest = v.count;
-      patience = block_patience;
-    } else if (patience > 0) {
-      --patience;
-    } else {
-      begin = static_cast<std::size_t>(v.count) - 1;
-    }
-    for (std::size_t k = begin; k < static_cast<std::size_t>(v.count) && solution.pivots < max_pivots; ++k) {
-      const std::size_t i = v.contact[k];
-      set_state(i, v.becomes[k]);
-      ++solution.pivots;
-      if (slipping(v.becomes[k])) set_axial(i, v.becomes[k] == State::SlipForward ? target[i].upper_n : target[i].lower_n);
-    }
-    evaluate();
-  }
+  // Whether the last forces are the solution of this tick too: the first contact that they do not hold settles it.
+  judge(target, settled_n, v);
+  const bool rests = v.count == 0 && v.residual_n <= settled_n;
+  const bool limited = !rests && !exchange(target, v, solution) && !descend(target, v, solution);
   if (limited) {
-    // A stuck contact that is cut to its bound slips: its owner has to know.
-    for (std::size_t i = 0; i < size_; ++i) {
-      const double axial_n = contact_[i].axial_n;
-      if (contact_[i].state == State::Stuck && axial_n > target[i].upper_n) set_state(i, State::SlipForward);
-      if (contact_[i].state == State::Stuck && axial_n < target[i].lower_n) set_state(i, State::SlipBackward);
-      set_axial(i, std::clamp(axial_n, target[i].lower_n, target[i].upper_n));
-    }
+    cut_to_bounds(target);
     evaluate();
-    judge(target, v);
+    judge(target, infinity, v);
   }
   if (!std::isfinite(v.residual_n)) {
     // Nothing that is no number may reach the next tick.
     for (std::size_t i = 0; i < size_; ++i) {
       contact_[i].axial_n = contact_[i].lateral_n = 0.0;
       contact_[i].force_n = {};
-      force_[2 * i] = force_[2 * i + 1] = 0.0;
+      put_force(i);
     }
-    evaluated_ = false;
     evaluate();
   }
   solution.residual_n = v.residual_n;

@@ -7,10 +7,10 @@
 //     axial     ds_i = t.(d_i - u_i), the slip of the needle relative to the tissue in this tick,
 //               lower_i <= t.f_i <= upper_i,  ds_i > 0 only at upper_i,  ds_i < 0 only at lower_i       (MODELS 5)
 //   A strictly convex box-constrained quadratic programme: one solution. Block principal pivoting walks to it from the states of
-//   the last tick, and to single pivots (Murty's least index) when the number of violations stops falling.
+//   the last tick; when the number of violations stops falling, a primal active-set method, which cannot cycle, takes over.
 //   Residual, N: max of |t.f - clip(t.f + ds / G_tt, lower, upper)| and |n.(d - u)| / G_nn.
 //
-// Working unknowns, in this order: x and y of a stuck contact (frame-free), n of a slipping one; M = their compliance = L L^T.
+// Working unknowns, in this order: x and y of a stuck contact (frame-free), n of a slipping one; M = their compliance = L D L^T.
 // L is kept row by row: a row depends only on G and on the rows before it, never on its own history. So an exchange cuts L
 // behind the changed contact and continues it from the pristine G, a turn of the needle leaves the stuck contacts' rows as they are, and
 // nothing drifts however many exchanges there were.
@@ -58,6 +58,7 @@ struct Solution {
   SolverStatus status{SolverStatus::Ok};
   int pivots{};         // contacts that changed state
   int iterations{};     // solves with the factor
+  int descents{};       // steps of the active-set method, where block pivoting did not end
   int rows_factored{};  // rows of L that had to be computed
   double residual_n{};
 };
@@ -66,8 +67,9 @@ class Solver {
  public:
   static constexpr std::size_t capacity = capacity::contacts;
   static constexpr double tolerance_n = 1e-9;  // of the residual
-  static constexpr int max_iterations = 64;
-  static constexpr int max_pivots = 8 * static_cast<int>(capacity);
+  static constexpr int max_exchanges = 32;     // iterations of block pivoting
+  static constexpr int max_iterations = 256;   // altogether
+  static constexpr int max_pivots = max_exchanges * static_cast<int>(capacity) + max_iterations;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
@@ -84,9 +86,11 @@ class Solver {
   Solution solve(std::span<const Target> target) noexcept;
 
   [[nodiscard]] const Contact& contact(std::size_t i) const noexcept { return contact_[i]; }
-  [[nodiscard]] Vector2 displacement_m(std::size_t i) const noexcept { return {displacement_[2 * i], displacement_[2 * i + 1]}; }
+  [[nodiscard]] Vector2 displacement_m(std::size_t i) const noexcept { return {displacement_[i], displacement_[half + i]}; }
   [[nodiscard]] Block compliance(std::size_t i, std::size_t j) const noexcept {
-    return {g(2 * i, 2 * j), g(2 * i, 2 * j + 1), g(2 * i + 1, 2 * j), g(2 * i + 1, 2 * j + 1)};
+    const Column& x = compliance_[2 * j];
+    const Column& y = compliance_[2 * j + 1];
+    return {x[i], y[i], x[half + i], y[half + i]};
   }
   // Sets the state from which the next solve starts. For tests and benchmarks: the solution does not depend on it.
   void start_from(std::size_t i, State state) noexcept;
@@ -102,12 +106,16 @@ class Solver {
     std::uint16_t contact{};
     Direction direction{};
   };
-  // A multiple of 8, but not of 64: columns that start at the same cache set would evict each other.
-  static constexpr std::size_t stride = 2 * capacity + 8;
+  // A vector over the contacts keeps all x before all y, so that loops run in whole vectors. y begins at `half`: a multiple of 4, while
+  // 2 * half is none of 64, because columns that start at the same cache set would evict each other.
+  static constexpr std::size_t half = capacity + 4;
+  static constexpr std::size_t stride = 2 * half;
   using Column = std::array<double, stride>;
 
-  [[nodiscard]] double g(std::size_t row, std::size_t column) const noexcept { return compliance_[column][row]; }
   [[nodiscard]] Vector2 direction(const Unknown& unknown) const noexcept;
+  void put_force(std::size_t i) noexcept;                                        // force_n into -f
+  void compose_force(std::size_t i, double axial_n, double lateral_n) noexcept;  // sets the parts, force_n and -f
+  void resolve_force(std::size_t i) noexcept;                                    // the parts from force_n
   void set_row(std::size_t i, std::span<const Block> row) noexcept;
   void withdraw(std::size_t i) noexcept;  // from the working order; cuts the factor
   void enter(std::size_t i) noexcept;     // at the end of the working order
@@ -116,27 +124,44 @@ class Solver {
   void set_axial(std::size_t i, double axial_n) noexcept;
   void evaluate() noexcept;  // u = G f
   int factorise() noexcept;
+  void invert_block(std::size_t first) noexcept;
   void assemble_rows(std::size_t first) noexcept;
   void solve_unknowns(std::span<const Target> target) noexcept;
+  void cut_to_bounds(std::span<const Target> target) noexcept;
   struct Violations {
     int count{};
     double free_residual_n{};
     double residual_n{};
+    double tolerance_n{};  // that a violation has to exceed
     std::array<std::uint16_t, capacity> contact{};
     std::array<State, capacity> becomes{};
   };
-  void judge(std::span<const Target> target, Violations& violations) noexcept;
+  // Stops behind the first contact whose residual is more than `enough_n`.
+  void judge(std::span<const Target> target, double enough_n, Violations& violations) noexcept;
+  void correct(std::span<const Target> target, Violations& violations, Solution& solution) noexcept;
+  bool exchange(std::span<const Target> target, Violations& violations, Solution& solution) noexcept;
+  bool descend(std::span<const Target> target, Violations& violations, Solution& solution) noexcept;
+  // Goes back towards `before` until no stuck contact is beyond a bound; that which was slips.
+  bool stop_at_bound(std::span<const Target> target, const std::array<Contact, capacity>& before, double least_n) noexcept;
+  void release_worst(std::span<const Target> target, const Violations& violations) noexcept;
 
   std::size_t size_{0};
   std::size_t unknowns_{0};
-  std::size_t valid_{0};  // rows of L that hold
-  alignas(64) std::array<Column, 2 * capacity> compliance_{};
-  // Column j: L_ij below the diagonal, the mirror L_ji above it, so that both triangular solves run along columns.
+  std::size_t valid_{0};                                       // rows of L that hold
+  alignas(64) std::array<Column, 2 * capacity> compliance_{};  // columns x and y of contact 0, of contact 1, …
+  // Column j: D_jj on the diagonal, L_ij D_jj below it, the mirror L_ji above it, so that both triangular solves run along columns.
+  // Loops run up to 3 rows behind the last unknown; those rows are zero.
   alignas(64) std::array<Column, 2 * capacity> factor_{};
-  alignas(64) Column force_{}, displacement_{}, work_{};
+  alignas(64) Column displacement_{}, unknown_{};
+  alignas(64) std::array<double, 2 * capacity> reaction_{};  // -f: x and y of contact 0, of contact 1, …
+  alignas(64) std::array<double, half> tangent_x_{}, tangent_y_{};
   std::array<double, 2 * capacity> inverse_pivot_{};
+  static constexpr std::size_t block = 8;
+  struct BlockInverse {
+    std::array<std::array<double, block>, block> by_row{}, by_column{};
+  };
+  alignas(64) std::array<BlockInverse, 2 * capacity / block> block_inverse_{};  // of L's diagonal blocks
   std::array<Unknown, 2 * capacity> order_{};
-  std::array<Vector2, capacity> tangent_{};
   std::array<Contact, capacity> contact_{};
   bool evaluated_{true};
 };

@@ -149,6 +149,23 @@ TEST(Solver, MeetsGaussSeidelOnManyContacts) {
   }
 }
 
+// Block pivoting walks in circles on some problems; the method that takes over must find their solution too.
+TEST(Solver, SolvesWhatBlockPivotingDoesNot) {
+  reference::Random random(5);
+  int found_by_descent = 0;
+  for (int k = 0; k < 20'000 && found_by_descent < 20; ++k) {
+    const reference::BoxQp qp{reference::random_compliance(random, 12, 1e5), random_contacts(random, 12)};
+    const auto solver = solver_of(qp.compliance_m_per_n);
+    const Solution found = solver->solve(targets_of(qp.contact));
+    ASSERT_EQ(found.status, SolverStatus::Ok) << k;
+    ASSERT_LE(found.pivots, Solver::max_pivots);
+    if (found.descents == 0) continue;
+    ++found_by_descent;
+    EXPECT_LE(reference::residual_n(qp, forces_of(*solver)), Solver::tolerance_n) << k;
+  }
+  EXPECT_EQ(found_by_descent, 20);
+}
+
 // The coupling of neighbours in tissue: every contact slips but for some that a reversal sticks.
 TEST(Solver, MeetsGaussSeidelOnALineOfContacts) {
   constexpr std::size_t s = 32;
