@@ -136,8 +136,10 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   }
   if (base.theta_rad != pose_.theta_rad || !started_) axis_ = {std::cos(base.theta_rad), std::sin(base.theta_rad)};
   if (started_ && density_.depends_on_speed()) {
-    const double speed = dot(axis_, {base.x_m - pose_.x_m, base.y_m - pose_.y_m}) / dt_s;
-    speed_m_s_ += (speed - speed_m_s_) * dt_s / (speed_filter_s + dt_s);
+    // Without a division by the time step, which may be next to nothing.
+    const double way_m = dot(axis_, {base.x_m - pose_.x_m, base.y_m - pose_.y_m});
+    const double speed = (speed_m_s_ * speed_filter_s + way_m) / (speed_filter_s + dt_s);
+    if (std::isfinite(speed)) speed_m_s_ = speed;
     shaft_n_per_m_ = density_.shaft_n_per_m(std::abs(speed_m_s_));
     tip_n_per_m_ = density_.tip_n_per_m(std::abs(speed_m_s_));
   }
