@@ -385,7 +385,13 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     evaluate();
   }
   if (limited) {
-    for (std::size_t i = 0; i < size_; ++i) set_axial(i, std::clamp(contact_[i].axial_n, target[i].lower_n, target[i].upper_n));
+    // A stuck contact that is cut to its bound slips: its owner has to know.
+    for (std::size_t i = 0; i < size_; ++i) {
+      const double axial_n = contact_[i].axial_n;
+      if (contact_[i].state == State::Stuck && axial_n > target[i].upper_n) set_state(i, State::SlipForward);
+      if (contact_[i].state == State::Stuck && axial_n < target[i].lower_n) set_state(i, State::SlipBackward);
+      set_axial(i, std::clamp(axial_n, target[i].lower_n, target[i].upper_n));
+    }
     evaluate();
     judge(target, v);
   }
