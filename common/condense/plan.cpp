@@ -1,11 +1,11 @@
 #include "common/condense/plan.hpp"
 
 #include <fmt/format.h>
-#include <optional>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "common/condense/naming_the_file.hpp"
 #include "common/core/capacities.hpp"

@@ -5,11 +5,13 @@ cmake_minimum_required(VERSION 3.25)
 
 set(rules
   "^common/ -> ^(hal|firmware|sim_plant|host)/"
-  "^common/(core|mechanism|rig)$ -> ^common/(config|wire|capture|fem|scene|experiment)/"
+  "^common/(core|mechanism|rig|element|model|contact|insertion)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
   "^common/core$ -> ^common/(mechanism|rig)/"
-  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/experiment)/"
+  "^common/model$ -> ^common/(contact|insertion)/"
+  "^common/image_file$ -> ^common/(fem|scene|condense)/"
+  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/condense|common/image_file|common/experiment)/"
   "^firmware/ -> ^(sim_plant|host)/"
-  "^firmware/(control|safety|controller)$ -> ^common/(config|wire|capture|fem|scene|experiment)/"
+  "^firmware/(control|safety|controller)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
   "^sim_plant/ -> ^host/"
   "^sim_plant/(mechanism|nodes|phantom|plant)$ -> ^firmware/"
   "^host/ -> ^(hal|firmware|sim_plant)/")
