@@ -285,11 +285,14 @@ void Solver::invert_block(std::size_t j) noexcept {
     n[r][r] = 1.0;
 #pragma GCC unroll 8
     for (std::size_t l = 0; l < r; ++l)
-      for (std::size_t k = 0; k < block; ++k) n[r][k] -= factor_[j + r][j + l] * n[l][k];
+      for (std::size_t k = 0; k < (l < block / 2 ? block / 2 : block); ++k) n[r][k] -= factor_[j + r][j + l] * n[l][k];
   }
   inverse.by_row = n;
+  // Above the diagonal there are zeros from the start.
+#pragma GCC unroll 8
   for (std::size_t r = 0; r < block; ++r)
-    for (std::size_t k = 0; k < block; ++k) inverse.by_column[k][r] = n[r][k];
+#pragma GCC unroll 8
+    for (std::size_t k = 0; k <= r; ++k) inverse.by_column[k][r] = n[r][k];
 }
 
 // One correction of the working unknowns by L D L^T x = v.(d - u).
