@@ -1,17 +1,25 @@
 #include <fmt/core.h>
 #include "tests/benchmarks/accuracy/method.hpp"
 #include <chrono>
+#include <cmath>
+#include <optional>
 using namespace trocar;
 using namespace trocar::bench;
 int main(){
-  auto now=[]{return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();};
-  for(const Path&p:paths()) for(int level:{0,1,2}){ double a=now(); auto pts=visible_points(p,0.03,0.02); Answer r=fine_answer(p,0.0303,level,pts); fmt::print("{} level {} axial {:.5f} lateral {:.5f} slip {:.6f} share {:.3f} tip {:.6g} vis {:.6f} {:.6f} {:.6g} {:.2f} s\n",p.name,level,r.axial_n_per_m,r.lateral_n_per_m,r.slip_force_n,r.slipping,r.tip_m,r.axial_visible.norm(),r.lateral_visible.norm(),r.slip_visible_m.norm(),now()-a); std::fflush(stdout);}
-  for(const Path&p:paths()) for(int n:{11,21,41,81}) for(auto m:{contact::Method::Snap,contact::Method::Adapt,contact::Method::Embedded,contact::Method::Subdivide}){
-    double a=now(); auto sc=block_scene(fem::Type::Tri3,n,p); auto pts=visible_points(p,0.03,0.02);
-    try{ std::unique_ptr<Compiled> c= m==contact::Method::Subdivide?std::make_unique<Compiled>(sc,subdivided_mesh(sc,p,0.0303)):std::make_unique<Compiled>(sc);
-    auto q=coarse_answer(*c,m,p,0.0303,pts); auto&r=q.answer;
-    fmt::print("{} {} {} axial {:.5f} lateral {:.5f} slip {:.6f} tip {:.6g} vis {:.6f} {:.6f} {:.6g} contacts {} {} {:.2f} s\n",p.name,n,name_of(m),r.axial_n_per_m,r.lateral_n_per_m,r.slip_force_n,r.tip_m,r.axial_visible.norm(),r.lateral_visible.norm(),r.slip_visible_m.norm(),q.contacts,to_string(q.status),now()-a);}
-    catch(const std::exception&e){fmt::print("{} {} {} FAILED {}\n",p.name,n,name_of(m),e.what());}
-    std::fflush(stdout);
-  }
+  const std::vector<double> depths{0.026,0.0281,0.0303,0.0322,0.0343};
+  for(const Path&p:paths()) { 
+    std::vector<Answer> refs; for(double d:depths) {refs.push_back(fine_answer(p,d,1,visible_points(p,d,0.02))); auto&r=refs.back(); fmt::print("ref {} {} {:.4f} {:.4f} slip {:.5f} share {:.3f} tip {:.4g}\n",p.name,d,r.axial_n_per_m,r.lateral_n_per_m,r.slip_force_n,r.slipping,r.tip_m);}
+    for(auto type:{fem::Type::Tri3,fem::Type::Quad4}) for(int n:{11,21,41,61,81}) { auto sc=block_scene(type,n,p); Compiled c(sc);
+     for(auto m:{contact::Method::Snap,contact::Method::Adapt,contact::Method::Embedded,contact::Method::Subdivide}){
+      if(type==fem::Type::Quad4&&m==contact::Method::Subdivide) continue;
+      double e[7]={}; double mean[2]={}; auto worst=insertion::Status::Ok; try{
+      for(std::size_t k=0;k<depths.size();++k){ double d=depths[k]; auto pts=visible_points(p,d,0.02); std::optional<Compiled> own; if(m==contact::Method::Subdivide) own.emplace(subdivided(sc,p,d));
+       auto q=coarse_answer(own?*own:c,m,p,d,pts); auto&r=q.answer; auto&f=refs[k]; worst=std::max(worst,q.status);
+       auto sq=[](double x){return x*x;};
+       mean[0]+=(r.axial_n_per_m/f.axial_n_per_m-1)/5; mean[1]+=(r.lateral_n_per_m/f.lateral_n_per_m-1)/5;
+       e[0]+=sq(r.axial_n_per_m/f.axial_n_per_m-1); e[1]+=sq(r.lateral_n_per_m/f.lateral_n_per_m-1); e[2]+=sq((r.axial_visible-f.axial_visible).norm()/f.axial_visible.norm()); e[3]+=sq((r.lateral_visible-f.lateral_visible).norm()/f.lateral_visible.norm()); e[4]+=sq(r.slip_force_n/f.slip_force_n-1); e[5]+=sq((r.slip_visible_m-f.slip_visible_m).norm()/f.slip_visible_m.norm()); e[6]+=sq(r.tip_m/f.tip_m-1);}
+      fmt::print("{:14} {} {:3} {:10}",p.name,type==fem::Type::Tri3?"tri":"quad",n,name_of(m)); for(double x:e) fmt::print(" {:8.3f}",100*std::sqrt(x/5)); fmt::print("  mean {:6.2f} {:6.2f} {}\n",100*mean[0],100*mean[1],to_string(worst));
+      }catch(const std::exception&x){fmt::print("{} {} {} FAILED {}\n",p.name,n,name_of(m),x.what());}
+      std::fflush(stdout);
+  }}}
 }

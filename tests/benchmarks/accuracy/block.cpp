@@ -7,6 +7,11 @@
 
 namespace trocar::bench {
 
+double density_integral_n(double from_m, double to_m, double tip_depth_m) {
+  const double in_zone = std::max(0.0, to_m - std::max(from_m, tip_depth_m - tip_zone_m));
+  return shaft_n_per_m * (to_m - from_m) + (tip_n_per_m - shaft_n_per_m) * in_zone;
+}
+
 fem::Point Path::at(double depth_m) const {
   return {entry_x_m + depth_m * std::sin(angle_rad), depth_m * std::cos(angle_rad), 0.0};
 }

@@ -16,6 +16,9 @@ inline constexpr double side_m = 0.1;
 inline constexpr double needle_length_m = 0.06;
 inline constexpr double shaft_n_per_m = 34.0, tip_n_per_m = 68.0, tip_zone_m = 0.0025;
 
+// What the shaft between two depths carries at most while it cuts, its tip at tip_depth_m.
+[[nodiscard]] double density_integral_n(double from_m, double to_m, double tip_depth_m);
+
 struct Path {
   std::string name{};
   double entry_x_m{};

@@ -77,18 +77,10 @@ FineMesh make(const Path& path, double depth_m, int level) {
   return fine;
 }
 
-// Density over a node's share of the shaft, half way to its neighbours.
-double upper_n(const std::vector<double>& depth, std::size_t i) {
-  const double begin = i == 0 ? depth.front() : 0.5 * (depth[i - 1] + depth[i]);
-  const double end = i + 1 == depth.size() ? depth.back() : 0.5 * (depth[i] + depth[i + 1]);
-  const double in_zone = std::max(0.0, end - std::max(begin, depth.back() - tip_zone_m));
-  return shaft_n_per_m * (end - begin) + (tip_n_per_m - shaft_n_per_m) * in_zone;
-}
-
 }  // namespace
 
-// The stuck needle takes some 40 N/m; its thresholds sum to 34 N/m times its depth.
-double slip_motion_m(double depth_m) { return 0.35 * depth_m; }
+// The thresholds of 30 mm sum to 1.1 N, and stuck they would take 193 N/m.
+double slip_motion_m(double depth_m) { return 0.13 * depth_m; }
 
 fem::Mesh conforming_mesh(const Path& path, double depth_m, int level) { return make(path, depth_m, level).mesh; }
 
@@ -142,8 +134,9 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
   for (const int n : fine.shaft) depth.push_back(fine.mesh.node[static_cast<std::size_t>(n)][1] / ty);
   const double motion_m = slip_motion_m(depth_m);
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    const double share_n = shaft_n_per_m * ((i + 1 < depth.size() ? 0.5 * (depth[i] + depth[i + 1]) : depth[i]) - (i > 0 ? 0.5 * (depth[i - 1] + depth[i]) : depth[i]));
-    qp.contact.push_back({{tx, ty}, {motion_m * tx, motion_m * ty}, -share_n, upper_n(depth, i)});
+    const double begin = i == 0 ? 0.0 : 0.5 * (depth[i - 1] + depth[i]);
+    const double end = i + 1 == depth.size() ? depth[i] : 0.5 * (depth[i] + depth[i + 1]);
+    qp.contact.push_back({{tx, ty}, {motion_m * tx, motion_m * ty}, -shaft_n_per_m * (end - begin), density_integral_n(begin, end, depth_m)});
   }
   const reference::Solution found = reference::projected_gauss_seidel(qp, 1e-9, 3000);
   if (!found.solved) throw std::runtime_error("the fine mesh's stick-slip problem was not solved");
@@ -152,9 +145,9 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
     f.segment<2>(2 * fine.shaft[static_cast<std::size_t>(i)]) = found.force_n.segment<2>(2 * i);
     answer.slip_force_n += tx * found.force_n(2 * i) + ty * found.force_n(2 * i + 1);
     const auto k = static_cast<std::size_t>(i);
-    if (found.state[k] != reference::Axial::Stuck) answer.slipping += upper_n(depth, k);
+    if (found.state[k] != reference::Axial::Stuck) answer.slipping += qp.contact[k].upper_n;
   }
-  answer.slipping /= shaft_n_per_m * depth_m + (tip_n_per_m - shaft_n_per_m) * tip_zone_m;
+  answer.slipping /= density_integral_n(0.0, depth_m, depth_m);
   const Eigen::VectorXd u = statics.solve(f);
   answer.slip_visible_m = displacement_at(locator, u, places);
   answer.tip_m = tx * u(2 * fine.shaft.back()) + ty * u(2 * fine.shaft.back() + 1);

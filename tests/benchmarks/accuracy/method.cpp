@@ -22,9 +22,13 @@ class Placed {
     law_.method = method == contact::Method::Subdivide ? contact::Method::Snap : method;
     law_.shaft_n_per_m *= density_factor;
     law_.tip_n_per_m *= density_factor;
+    // Explicit contacts have literal thresholds; the others follow from the densities.
+    for (std::size_t i = 0; i < law_.explicit_count; ++i) law_.explicit_slip_force_n[i] *= density_factor;
     image_.law = &law_;
     insertion_->open(image_);
-    note(insertion_->step(base_pose(path, depth_m), 1e-3));
+    const insertion::Result at_rest = insertion_->step(base_pose(path, depth_m), 1e-3);
+    note(at_rest);
+    rest_ = at_rest.base;
   }
 
   insertion::Result move(double along_m, double across_m) {
@@ -37,8 +41,10 @@ class Placed {
     return result;
   }
 
-  [[nodiscard]] insertion::Insertion& insertion() { return *insertion_; }
+  [[nodiscard]] const insertion::Insertion& insertion() const { return *insertion_; }
   [[nodiscard]] insertion::Status status() const { return status_; }
+  // What holds the nodes that snap has pulled onto the shaft, before the base moves. Zero for the other methods.
+  [[nodiscard]] const insertion::Wrench& rest() const { return rest_; }
 
   // Contact forces on the nodes of the mesh, 2 rows a node.
   [[nodiscard]] Eigen::VectorXd loads_n(const Compiled& compiled) const {
@@ -73,6 +79,7 @@ class Placed {
   double depth_m_;
   std::unique_ptr<insertion::Insertion> insertion_{std::make_unique<insertion::Insertion>()};
   insertion::Status status_{};
+  insertion::Wrench rest_{};
 };
 
 double axial(const insertion::Wrench& base, const Path& path) {
@@ -122,10 +129,22 @@ const char* name_of(contact::Method method) {
   return "subdivide";
 }
 
-fem::Mesh subdivided_mesh(const scene::Scene& scene, const Path& path, double depth_m) {
+Compiled subdivided(scene::Scene scene, const Path& path, double depth_m) {
   fem::Mesh mesh = fem::make_mesh(scene.tissue);
-  (void)fem::subdivide(mesh, path.at(0.0), path.at(depth_m));
-  return mesh;
+  const std::vector<int> nodes = fem::subdivide(mesh, path.at(0.0), path.at(depth_m), 0.0);
+  if (nodes.size() > capacity::contacts) throw std::runtime_error("subdivision makes more contacts than there may be");
+  contact::Law& law = *scene.contact;
+  std::vector<double> depth;
+  for (const int n : nodes) depth.push_back(mesh.node[static_cast<std::size_t>(n)][1] / path.tangent()[1]);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const fem::Point& x = mesh.node[static_cast<std::size_t>(nodes[i])];
+    const double begin = i == 0 ? 0.0 : 0.5 * (depth[i - 1] + depth[i]);
+    const double end = i + 1 == nodes.size() ? depth_m : 0.5 * (depth[i] + depth[i + 1]);
+    law.explicit_point_m[i] = {x[0], x[1]};
+    law.explicit_slip_force_n[i] = density_integral_n(begin, end, depth_m);
+  }
+  law.explicit_count = static_cast<std::uint32_t>(nodes.size());
+  return {scene, mesh};
 }
 
 insertion::Pose base_pose(const Path& path, double depth_m) {
@@ -139,8 +158,10 @@ Asked coarse_answer(const Compiled& compiled, contact::Method method, const Path
   Asked asked;
   Placed along(compiled, method, glued_n_per_m, path, depth_m), across(compiled, method, glued_n_per_m, path, depth_m);
   Placed slipping(compiled, method, 1.0, path, depth_m);
-  asked.answer.axial_n_per_m = axial(along.move(small_m, 0.0).base, path) / small_m;
-  asked.answer.lateral_n_per_m = lateral(across.move(0.0, small_m).base, path) / small_m;
+  // Stiffness and what it makes visible are changes from rest; partial slip is what the needle does altogether.
+  const Eigen::VectorXd rest_n = along.loads_n(compiled);
+  asked.answer.axial_n_per_m = (axial(along.move(small_m, 0.0).base, path) - axial(along.rest(), path)) / small_m;
+  asked.answer.lateral_n_per_m = (lateral(across.move(0.0, small_m).base, path) - lateral(across.rest(), path)) / small_m;
   asked.answer.slip_force_n = axial(slipping.move(slip_motion_m(depth_m), 0.0).base, path);
   asked.status = std::max({along.status(), across.status(), slipping.status()});
   asked.contacts = slipping.insertion().contacts();
@@ -149,7 +170,7 @@ Asked coarse_answer(const Compiled& compiled, contact::Method method, const Path
   const fem::Statics statics(mesh, block_tissue());
   const fem::Locator locator(mesh);
   Eigen::MatrixXd loads(statics.degrees_of_freedom(), 3);
-  loads << along.loads_n(compiled) / small_m, across.loads_n(compiled) / small_m, slipping.loads_n(compiled);
+  loads << (along.loads_n(compiled) - rest_n) / small_m, (across.loads_n(compiled) - rest_n) / small_m, slipping.loads_n(compiled);
   const Eigen::MatrixXd u = statics.solve(loads);
   asked.answer.axial_visible = displacement_at(locator, u.col(0), places);
   asked.answer.lateral_visible = displacement_at(locator, u.col(1), places);

@@ -36,8 +36,8 @@ class Compiled {
 
 [[nodiscard]] const char* name_of(contact::Method method);
 
-// The mesh of subdivide: made to conform to the path by common/fem. Its contacts are those of snap.
-[[nodiscard]] fem::Mesh subdivided_mesh(const scene::Scene& scene, const Path& path, double depth_m);
+// Subdivide: common/fem makes the mesh conform to the path, and the nodes on it, all of them exactly, are explicit contacts.
+[[nodiscard]] Compiled subdivided(scene::Scene scene, const Path& path, double depth_m);
 
 struct Asked {
   Answer answer{};
