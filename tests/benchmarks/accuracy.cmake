@@ -1,5 +1,5 @@
 trocar_library(tests/benchmarks/accuracy
-  SOURCES block.cpp fine_reference.cpp method.cpp
+  SOURCES block.cpp fine_reference.cpp course.cpp method.cpp output.cpp solid.cpp
   DEPENDS common_condense common_fem common_insertion common_model common_scene tests_reference
   PRIVATE_DEPENDS fmt::fmt host_report)
 trocar_program(accuracy_benchmark SOURCES accuracy_benchmark.cpp DEPENDS tests_benchmarks_accuracy fmt::fmt)

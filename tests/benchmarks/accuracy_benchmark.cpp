@@ -1,25 +1,217 @@
+// How wrong the path methods are against a conforming fine mesh, how they converge, how continuous their force is, and what a tick takes.
+//   accuracy_benchmark [--out FOLDER] [--quick]
 #include <fmt/core.h>
-#include "tests/benchmarks/accuracy/method.hpp"
-#include <chrono>
+
+#include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
 #include <optional>
-using namespace trocar;
-using namespace trocar::bench;
-int main(){
-  const std::vector<double> depths{0.026,0.0281,0.0303,0.0322,0.0343};
-  for(const Path&p:paths()) { 
-    std::vector<Answer> refs; for(double d:depths) {refs.push_back(fine_answer(p,d,1,visible_points(p,d,0.02))); auto&r=refs.back(); fmt::print("ref {} {} {:.4f} {:.4f} slip {:.5f} share {:.3f} tip {:.4g}\n",p.name,d,r.axial_n_per_m,r.lateral_n_per_m,r.slip_force_n,r.slipping,r.tip_m);}
-    for(auto type:{fem::Type::Tri3,fem::Type::Quad4}) for(int n:{11,21,41,61,81}) { auto sc=block_scene(type,n,p); Compiled c(sc);
-     for(auto m:{contact::Method::Snap,contact::Method::Adapt,contact::Method::Embedded,contact::Method::Subdivide}){
-      if(type==fem::Type::Quad4&&m==contact::Method::Subdivide) continue;
-      double e[7]={}; double mean[2]={}; auto worst=insertion::Status::Ok; try{
-      for(std::size_t k=0;k<depths.size();++k){ double d=depths[k]; auto pts=visible_points(p,d,0.02); std::optional<Compiled> own; if(m==contact::Method::Subdivide) own.emplace(subdivided(sc,p,d));
-       auto q=coarse_answer(own?*own:c,m,p,d,pts); auto&r=q.answer; auto&f=refs[k]; worst=std::max(worst,q.status);
-       auto sq=[](double x){return x*x;};
-       mean[0]+=(r.axial_n_per_m/f.axial_n_per_m-1)/5; mean[1]+=(r.lateral_n_per_m/f.lateral_n_per_m-1)/5;
-       e[0]+=sq(r.axial_n_per_m/f.axial_n_per_m-1); e[1]+=sq(r.lateral_n_per_m/f.lateral_n_per_m-1); e[2]+=sq((r.axial_visible-f.axial_visible).norm()/f.axial_visible.norm()); e[3]+=sq((r.lateral_visible-f.lateral_visible).norm()/f.lateral_visible.norm()); e[4]+=sq(r.slip_force_n/f.slip_force_n-1); e[5]+=sq((r.slip_visible_m-f.slip_visible_m).norm()/f.slip_visible_m.norm()); e[6]+=sq(r.tip_m/f.tip_m-1);}
-      fmt::print("{:14} {} {:3} {:10}",p.name,type==fem::Type::Tri3?"tri":"quad",n,name_of(m)); for(double x:e) fmt::print(" {:8.3f}",100*std::sqrt(x/5)); fmt::print("  mean {:6.2f} {:6.2f} {}\n",100*mean[0],100*mean[1],to_string(worst));
-      }catch(const std::exception&x){fmt::print("{} {} {} FAILED {}\n",p.name,n,name_of(m),x.what());}
-      std::fflush(stdout);
-  }}}
+#include <stdexcept>
+
+#include "tests/benchmarks/accuracy/course.hpp"
+#include "tests/benchmarks/accuracy/output.hpp"
+#include "tests/benchmarks/accuracy/solid.hpp"
+
+namespace trocar::bench {
+namespace {
+
+using contact::Method;
+constexpr Method methods[] = {Method::Snap, Method::Adapt, Method::Embedded, Method::Subdivide};
+
+struct Options {
+  std::filesystem::path out{};
+  bool quick{};
+};
+
+const char* element_name(fem::Type type) { return type == fem::Type::Tri3 ? "tri3" : "quad4"; }
+
+class Bench {
+ public:
+  explicit Bench(const Options& options)
+      : options_(options),
+        paths_(paths()),
+        depth_m_(options.quick ? std::vector{0.0283} : std::vector{0.0260, 0.0283, 0.0309, 0.0338}),
+        sides_(options.quick ? std::vector{11, 21} : std::vector{11, 21, 41, 61, 81}) {
+    if (options.quick) paths_ = {paths_[1], paths_[3]};
+  }
+
+  void references();
+  void errors();
+  void solids();
+  void finish();
+
+ private:
+  void mesh(const Path& path, std::size_t path_index, fem::Type type, int side);
+  void claims();
+
+  Options options_;
+  std::vector<Path> paths_;
+  std::vector<double> depth_m_;
+  std::vector<int> sides_;
+  std::vector<fem::Point> places_{visible_points()};
+  std::vector<std::vector<Answer>> reference_{};  // of each path, of each depth
+  std::vector<ReferenceRow> reference_rows_{};
+  std::vector<ErrorRow> errors_{};
+  std::vector<CourseRow> courses_{};
+  std::vector<SolidAnswer> solids_{};
+  std::vector<Claim> claims_{};
+};
+
+double visible_error(const Eigen::VectorXd& u, const Eigen::VectorXd& right, const std::vector<bool>& counts) {
+  double wrong = 0.0, size = 0.0;
+  for (std::size_t p = 0; p < counts.size(); ++p) {
+    if (!counts[p]) continue;
+    const auto row = 2 * static_cast<Eigen::Index>(p);
+    wrong += (u - right).segment<2>(row).squaredNorm();
+    size += right.segment<2>(row).squaredNorm();
+  }
+  return std::sqrt(wrong / size);
+}
+
+Metrics compare(const Answer& answer, const Answer& right, const std::vector<bool>& counts) {
+  const auto off = [](double value, double exact) { return std::abs(value / exact - 1.0); };
+  return {off(answer.axial_n_per_m, right.axial_n_per_m),
+          off(answer.lateral_n_per_m, right.lateral_n_per_m),
+          visible_error(answer.axial_visible, right.axial_visible, counts),
+          visible_error(answer.lateral_visible, right.lateral_visible, counts),
+          visible_error(answer.slip_visible_m, right.slip_visible_m, counts),
+          off(answer.slip_force_n, right.slip_force_n),
+          off(answer.tip_m, right.tip_m)};
+}
+
+// Two refinements of the fine mesh; the finer one is the reference. Their difference bounds its error as long as refining reduces errors.
+void Bench::references() {
+  const int finest = options_.quick ? 1 : 2;
+  for (const Path& path : paths_) {
+    std::vector<Answer> answers;
+    ReferenceRow row{path.name, 0.0, {}};
+    for (const double depth : depth_m_) {
+      std::vector<bool> counts;
+      for (const fem::Point& x : places_) counts.push_back(distance_to_shaft_m(path, depth, x) >= 0.0025);
+      const Answer coarser = fine_answer(path, depth, finest - 1, places_);
+      answers.push_back(fine_answer(path, depth, finest, places_));
+      const Metrics change = compare(coarser, answers.back(), counts);
+      for (std::size_t m = 0; m < change.size(); ++m) row.change[m] = std::max(row.change[m], change[m]);
+      row.slipping += answers.back().slipping / static_cast<double>(depth_m_.size());
+    }
+    reference_.push_back(answers);
+    reference_rows_.push_back(row);
+  }
+}
+
+void Bench::mesh(const Path& path, std::size_t path_index, fem::Type type, int side) {
+  const scene::Scene scene = block_scene(type, side, path);
+  const Compiled compiled(scene);
+  const double h_m = side_m / (side - 1);
+  for (const Method method : methods) {
+    if (method == Method::Subdivide && type != fem::Type::Tri3) continue;
+    ErrorRow row{path.name, element_name(type), side, name_of(method), {}, {}, 0.0, 0, {}};
+    double tick_us = 0.0;
+    for (std::size_t k = 0; k < depth_m_.size(); ++k) {
+      const double depth = depth_m_[k];
+      std::vector<bool> counts;
+      for (const fem::Point& x : places_) counts.push_back(distance_to_shaft_m(path, depth, x) >= 2.0 * h_m);
+      std::optional<Compiled> own;
+      if (method == Method::Subdivide) own.emplace(subdivided(scene, path, depth));
+      const Asked asked = coarse_answer(own ? *own : compiled, method, path, depth, places_);
+      const Answer& right = reference_[path_index][k];
+      const Metrics off = compare(asked.answer, right, counts);
+      for (std::size_t m = 0; m < off.size(); ++m) row.error[m] += off[m] * off[m] / static_cast<double>(depth_m_.size());
+      row.answer = asked.answer;
+      row.contacts = std::max(row.contacts, asked.contacts);
+      row.status = std::max(row.status, asked.status);
+      // An offline method cannot grow with the needle: its tick is one with all of its contacts.
+      if (method == Method::Subdivide && k + 1 == depth_m_.size()) tick_us = push_explicit_us(*own, path, depth);
+    }
+    for (double& each : row.error) each = std::sqrt(each);
+    if (method != Method::Subdivide) {
+      const Course course = insert(compiled, method, path, depth_m_.back());
+      courses_.push_back({row.path, row.element, side, row.method, course});
+      tick_us = course.median_us;
+    }
+    row.tick_us = tick_us;
+    errors_.push_back(row);
+  }
+}
+
+void Bench::errors() {
+  for (std::size_t p = 0; p < paths_.size(); ++p)
+    for (const fem::Type type : {fem::Type::Tri3, fem::Type::Quad4})
+      for (const int side : sides_) mesh(paths_[p], p, type, side);
+  claims();
+}
+
+// The claims, one for each figure: over the meshes and paths of one element type, in geometric means.
+void Bench::claims() {
+  for (const char* element : {"tri3", "quad4"})
+    for (std::size_t m = 0; m < metric_name.size(); ++m)
+      for (const bool oblique : {false, true}) {
+        double embedded = 0.0, adapt = 0.0, snap = 0.0, count = 0.0;
+        for (const ErrorRow& row : errors_) {
+          if (row.element != element || row.path.starts_with("oblique") != oblique) continue;
+          const double log_error = std::log(row.error[m]);
+          if (row.method == "embedded") embedded += log_error, count += 1.0;
+          if (row.method == "adapt") adapt += log_error;
+          if (row.method == "snap") snap += log_error;
+        }
+        claims_.push_back({element, oblique ? "oblique" : "straight", metric_name[m], std::exp((adapt - embedded) / count),
+                           std::exp((snap - embedded) / count), std::exp((snap - adapt) / count)});
+      }
+}
+
+void Bench::solids() {
+  for (const double ratio : options_.quick ? std::vector{0.5, 1.0} : std::vector{0.5, 1.0, 2.0, 4.0}) {
+    fmt::print(stderr, "  radius / element size {} …\n", ratio);
+    solids_.push_back(solid_answer(ratio));
+  }
+}
+
+void Bench::finish() {
+  print(reference_rows_);
+  print(errors_);
+  print(claims_);
+  print_convergence(errors_, solids_);
+  const double worst_mn = print(courses_);
+  write(options_.out, reference_rows_, errors_, courses_, solids_);
+  fmt::print("\nforce continuity, embedded, every mesh and path: worst {:.3g} mN over 0.1 mm (goal 25): {}\n", worst_mn,
+             worst_mn <= 25.0 ? "met" : "MISSED");
+  fmt::print("tables and figures: {}\n", options_.out.string());
+}
+
+int run(int count, char** argument) {
+  Options options;
+  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
+  for (int k = 1; k < count; ++k) {
+    if (std::strcmp(argument[k], "--quick") == 0) {
+      options.quick = true;
+    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
+      options.out = argument[++k];
+    } else {
+      fmt::print(stderr, "accuracy_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
+      return 2;
+    }
+  }
+  Bench bench(options);
+  const auto step = [](const char* what, auto work) {
+    fmt::print(stderr, "accuracy_benchmark: {} …\n", what);
+    work();
+  };
+  step("fine conforming meshes", [&] { bench.references(); });
+  step("path methods", [&] { bench.errors(); });
+  step("a solid", [&] { bench.solids(); });
+  bench.finish();
+  return 0;
+}
+
+}  // namespace
+}  // namespace trocar::bench
+
+int main(int count, char** argument) {
+  try {
+    return trocar::bench::run(count, argument);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "accuracy_benchmark: {}\n", error.what());
+    return 1;
+  }
 }

@@ -12,15 +12,16 @@ double density_integral_n(double from_m, double to_m, double tip_depth_m) {
   return shaft_n_per_m * (to_m - from_m) + (tip_n_per_m - shaft_n_per_m) * in_zone;
 }
 
-fem::Point Path::at(double depth_m) const {
-  return {entry_x_m + depth_m * std::sin(angle_rad), depth_m * std::cos(angle_rad), 0.0};
-}
+fem::Point Path::at(double depth_m) const { return {entry_x_m + depth_m * std::sin(angle_rad), depth_m * std::cos(angle_rad), 0.0}; }
 
 std::array<double, 2> Path::tangent() const { return {std::sin(angle_rad), std::cos(angle_rad)}; }
 
 std::vector<Path> paths() {
   const double degree = std::numbers::pi / 180.0;
-  return {{"on_grid_line", 0.0, 0.0}, {"off_grid_line", 0.0031, 0.0}, {"oblique_15", -0.0057, 15.0 * degree}, {"oblique_30", -0.0119, 30.0 * degree}};
+  return {{"on_grid_line", 0.0, 0.0},
+          {"off_grid_line", 0.0031, 0.0},
+          {"oblique_15", -0.0057, 15.0 * degree},
+          {"oblique_30", -0.0119, 30.0 * degree}};
 }
 
 fem::Tissue block_tissue() {
@@ -43,19 +44,19 @@ scene::Scene block_scene(fem::Type element, int nodes_per_side, const Path& path
   return scene;
 }
 
-std::vector<fem::Point> visible_points(const Path& path, double depth_m, double clearance_m) {
+std::vector<fem::Point> visible_points() {
   constexpr double pitch_m = 0.005;
-  const fem::Point entry = path.at(0.0);
-  const auto [tx, ty] = path.tangent();
   std::vector<fem::Point> places;
   for (int j = 0; j < 20; ++j)
-    for (int i = 0; i <= 20; ++i) {
-      const fem::Point x{pitch_m * (i - 10), pitch_m * j, 0.0};
-      const double along = std::clamp((x[0] - entry[0]) * tx + (x[1] - entry[1]) * ty, 0.0, depth_m);
-      const fem::Point nearest = path.at(along);
-      if (std::hypot(x[0] - nearest[0], x[1] - nearest[1]) >= clearance_m) places.push_back(x);
-    }
+    for (int i = 0; i <= 20; ++i) places.push_back({pitch_m * (i - 10), pitch_m * j, 0.0});
   return places;
+}
+
+double distance_to_shaft_m(const Path& path, double depth_m, const fem::Point& x) {
+  const fem::Point entry = path.at(0.0);
+  const auto [tx, ty] = path.tangent();
+  const fem::Point nearest = path.at(std::clamp((x[0] - entry[0]) * tx + (x[1] - entry[1]) * ty, 0.0, depth_m));
+  return std::hypot(x[0] - nearest[0], x[1] - nearest[1]);
 }
 
 Eigen::VectorXd displacement_at(const fem::Locator& locator, const Eigen::VectorXd& u_m, const std::vector<fem::Point>& places) {
@@ -64,7 +65,8 @@ Eigen::VectorXd displacement_at(const fem::Locator& locator, const Eigen::Vector
     const std::optional<fem::Embedding> at = locator.locate(places[p]);
     if (!at) throw std::logic_error("a visible point lies outside of the mesh");
     for (int k = 0; k < at->count; ++k)
-      u.segment<2>(2 * static_cast<Eigen::Index>(p)) += at->weight[static_cast<std::size_t>(k)] * u_m.segment<2>(2 * at->node[static_cast<std::size_t>(k)]);
+      u.segment<2>(2 * static_cast<Eigen::Index>(p)) +=
+          at->weight[static_cast<std::size_t>(k)] * u_m.segment<2>(2 * at->node[static_cast<std::size_t>(k)]);
   }
   return u;
 }

@@ -34,10 +34,12 @@ struct Path {
 [[nodiscard]] fem::Tissue block_tissue();  // without a grid
 [[nodiscard]] scene::Scene block_scene(fem::Type element, int nodes_per_side, const Path& path);
 
-// Places that somebody sees: a lattice of 5 mm, none nearer to the shaft than `clearance_m` and none on the held side.
-[[nodiscard]] std::vector<fem::Point> visible_points(const Path& path, double depth_m, double clearance_m);
+// Places that somebody sees: a lattice of 5 mm, none on the held side.
+[[nodiscard]] std::vector<fem::Point> visible_points();
+[[nodiscard]] double distance_to_shaft_m(const Path& path, double depth_m, const fem::Point& x);
 
 // 2 rows a place: displacement interpolated from all nodes.
-[[nodiscard]] Eigen::VectorXd displacement_at(const fem::Locator& locator, const Eigen::VectorXd& u_m, const std::vector<fem::Point>& places);
+[[nodiscard]] Eigen::VectorXd displacement_at(const fem::Locator& locator, const Eigen::VectorXd& u_m,
+                                              const std::vector<fem::Point>& places);
 
 }  // namespace trocar::bench

@@ -12,7 +12,7 @@ namespace trocar::bench {
 namespace {
 
 constexpr double smallest_m = 4e-5;
-constexpr double growth = 1.3;
+constexpr double growth = 1.2;
 
 // From 0 to length, intervals that grow from 0 on.
 std::vector<double> graded(double length_m) {
@@ -82,8 +82,6 @@ FineMesh make(const Path& path, double depth_m, int level) {
 // The thresholds of 30 mm sum to 1.1 N, and stuck they would take 193 N/m.
 double slip_motion_m(double depth_m) { return 0.13 * depth_m; }
 
-fem::Mesh conforming_mesh(const Path& path, double depth_m, int level) { return make(path, depth_m, level).mesh; }
-
 Answer fine_answer(const Path& path, double depth_m, int level, const std::vector<fem::Point>& places) {
   const FineMesh fine = make(path, depth_m, level);
   const fem::Locator locator(fine.mesh);
@@ -136,7 +134,8 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
   for (std::size_t i = 0; i < depth.size(); ++i) {
     const double begin = i == 0 ? 0.0 : 0.5 * (depth[i - 1] + depth[i]);
     const double end = i + 1 == depth.size() ? depth[i] : 0.5 * (depth[i] + depth[i + 1]);
-    qp.contact.push_back({{tx, ty}, {motion_m * tx, motion_m * ty}, -shaft_n_per_m * (end - begin), density_integral_n(begin, end, depth_m)});
+    qp.contact.push_back(
+        {{tx, ty}, {motion_m * tx, motion_m * ty}, -shaft_n_per_m * (end - begin), density_integral_n(begin, end, depth_m)});
   }
   const reference::Solution found = reference::projected_gauss_seidel(qp, 1e-9, 3000);
   if (!found.solved) throw std::runtime_error("the fine mesh's stick-slip problem was not solved");

@@ -13,10 +13,10 @@ namespace trocar::bench {
 
 // Base displaced along and across the shaft; what was asked of every method.
 struct Answer {
-  double axial_n_per_m{};    // stuck
-  double lateral_n_per_m{};  // stuck
-  double slip_force_n{};     // axial, some contacts slip
-  double tip_m{};            // axial displacement of the tissue at the tip in partial slip
+  double axial_n_per_m{};                              // stuck
+  double lateral_n_per_m{};                            // stuck
+  double slip_force_n{};                               // axial, some contacts slip
+  double tip_m{};                                      // axial displacement of the tissue at the tip in partial slip
   Eigen::VectorXd axial_visible{}, lateral_visible{};  // per m of the base, 2 rows a place
   Eigen::VectorXd slip_visible_m{};
   double slipping{};  // share of the shaft that slips
@@ -25,8 +25,7 @@ struct Answer {
 // Of the base, along the shaft, from rest: about half of the shaft slips then.
 [[nodiscard]] double slip_motion_m(double depth_m);
 
-// `level` times every interval is halved.
-[[nodiscard]] fem::Mesh conforming_mesh(const Path& path, double depth_m, int level);
+// `level` times every interval of the graded mesh is halved.
 [[nodiscard]] Answer fine_answer(const Path& path, double depth_m, int level, const std::vector<fem::Point>& places);
 
 }  // namespace trocar::bench

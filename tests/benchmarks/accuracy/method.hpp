@@ -1,5 +1,5 @@
-// The four path methods on a coarse mesh, asked the same as the fine one: the needle is placed in undeformed tissue by common/insertion, its
-// base is moved, and the contact forces that common/insertion reports are put on the mesh that the method has in the end (as it came,
+// The four path methods on a coarse mesh, asked the same as the fine one: the needle is placed in undeformed tissue by common/insertion,
+// its base is moved, and the contact forces that common/insertion reports are put on the mesh that the method has in the end (as it came,
 // with nodes moved, or subdivided), which common/fem solves for what is visible.
 #pragma once
 
