@@ -114,9 +114,38 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexce
   return before + 1;
 }
 
+// A line load q bends the displacement sharply, by -q |d| / (2 C t) at the distance d, and elements that the line crosses cannot: on the
+// line they miss q / (2 C t) sum w_k |d_k|, nothing where the line runs along edges. C is the shear modulus along the line, that of
+// uniaxial strain across it. In a solid the force is spread over the needle's cross-section, which the mesh may resolve.
+void WorkingSet::add_ridge(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept {
+  if (tissue_->model == element::Model::Solid) return;
+  const Vector2 chord = minus(to_m, from_m);
+  const Vector2 t = scaled(chord, 1.0 / length(chord));
+  double distance_m = 0.0;
+  for (std::uint32_t k = 0; k < at.count; ++k) {
+    const Vector2 x = minus(geometry_.node_m(at.node[k]), from_m);
+    distance_m += at.weight[k] * std::abs(t[0] * x[1] - t[1] * x[0]);
+  }
+  const std::int32_t middle = geometry_.locate(plus(from_m, scaled(chord, 0.5)), tip_cell_);
+  const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(middle < 0 ? tip_cell_ : middle)];
+  const element::Elasticity c = element::elasticity(tissue_->model, tissue_->material[cell.material]);
+  // The load's length is a whole segment's from the start: a shorter one is no line on the scale of the elements.
+  const double per_pa = std::max(0.0, distance_m) / (2.0 * tissue_->thickness_m * law_->spacing_m);
+  const double along = per_pa / c(2, 2);
+  const double across = per_pa / c(0, 0);
+  Block& own = row_[i];
+  own[0] += along * t[0] * t[0] + across * t[1] * t[1];
+  own[1] += (along - across) * t[0] * t[1];
+  own[2] = own[1];
+  own[3] += along * t[1] * t[1] + across * t[0] * t[0];
+  last_own_ = own;
+}
+
 void WorkingSet::push(const Point& point) noexcept {
   const std::size_t i = size();
   const std::size_t count = make_row(point.at, i);
+  if (law_->method == Method::Embedded && law_->explicit_count == 0)
+    add_ridge(point.at, point.begin_m, plus(point.begin_m, scaled(point.heading, point.length_m)), i);
   point_[i] = point;
   point_[i].material_m = geometry_.mean_m(point.at);
   solver_.push({row_.data(), count});
@@ -221,7 +250,9 @@ void WorkingSet::resize_last(double length_m) noexcept {
   last.length_m = now;
   last.fresh = true;
   forget_couplings(i);
-  solver_.replace(i, {row_.data(), make_row(last.at, i)});
+  const std::size_t count = make_row(last.at, i);
+  add_ridge(last.at, last.begin_m, end, i);
+  solver_.replace(i, {row_.data(), count});
 }
 
 void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept {

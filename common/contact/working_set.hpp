@@ -6,6 +6,9 @@
 //     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of a
 //     thirty-second of the spacing. While it is short its tie is softened by its own compliance times (spacing / length - 1), so that
 //     beginning or leaving it does not kick.
+//     In planar tissue its own compliance has the ridge added that a line load makes of the displacement and that elements cannot bend to,
+//     sum w_k |d_k| / (2 C t) per density, d_k the nodes' distances from the line: without it an oblique needle is some 3 % too stiff on
+//     80 x 80 elements (tests/benchmarks/accuracy_benchmark.cpp). displacement_m() is the elements' own, without the ridge.
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
 //   in the
 //     reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the tip.
@@ -103,6 +106,7 @@ class WorkingSet {
   void forget_couplings(std::size_t from_contact) noexcept;
   [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
   std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
+  void add_ridge(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
   void push(const Point& point) noexcept;
   void pop() noexcept;
   void resize_last(double length_m) noexcept;
