@@ -14,7 +14,7 @@ namespace {
 
 constexpr double radius_m = 5e-4;
 constexpr double length_m = 0.03;
-constexpr double depth_m = 0.015;
+constexpr double depth_m = 0.018;  // a whole number of segments on every mesh
 constexpr double glued_n_per_m = 1e9;
 constexpr double growth = 1.6;  // of neighbouring elements, at a radius per element
 
@@ -85,7 +85,7 @@ SolidAnswer solid_answer(double radius_per_element) {
     return result.base;
   };
   constexpr double small_m = 1e-4;
-  constexpr double slip_motion_m = 1.5e-3;
+  constexpr double slip_motion_m = 2.5e-3;
   answer.axial_n_per_m = ask(glued_n_per_m, small_m, 0.0, nullptr).fy_n / small_m;
   answer.lateral_n_per_m = ask(glued_n_per_m, 0.0, small_m, nullptr).fx_n / small_m;
   answer.slip_force_n = ask(1.0, slip_motion_m, 0.0, &answer.tip_m).fy_n;
