@@ -26,6 +26,7 @@ void write_file(const std::filesystem::path& path, const std::string& text) {
 // 13 slip_force.
 constexpr const char* figure = R"(
 set datafile separator ','
+set datafile missing NaN
 csv = folder.'/accuracy_error.csv'
 methods = 'snap adapt embedded subdivide'
 array colour[4] = ['#c0392b', '#2471a3', '#1e8449', '#b9770e']
@@ -36,7 +37,7 @@ do for [out in 'svg png'] {
   set multiplot layout 2,2 title 'Run time against error: a needle 30 degrees off the grid, triangles, 11^2 to 81^2 nodes (the number is the nodes per side)'
   set logscale xy
   set grid lc rgb '#dddddd'
-  set xlabel 'error'
+  set xlabel 'error [%]'
   set ylabel 'median tick [us]'
   set format x '%g'
   set key top right
@@ -45,8 +46,8 @@ do for [out in 'svg png'] {
   do for [panel = 1:4] {
     set title title_of[panel]
     c = column_of[panel]
-    plot for [i = 1:4] csv skip 1 using (strcol(1) eq 'oblique_30' && strcol(2) eq 'tri3' && strcol(4) eq word(methods, i) ? column(c) : NaN):5 with points pt symbol[i] ps 1.3 lw 2 lc rgb colour[i] title word(methods, i), \
-      for [i = 1:4] csv skip 1 using (strcol(1) eq 'oblique_30' && strcol(2) eq 'tri3' && strcol(4) eq word(methods, i) ? column(c) : NaN):5:3 with labels offset 1.3,0.5 font ',9' tc rgb colour[i] notitle
+    plot for [i = 1:4] csv skip 1 using (strcol(1) eq 'oblique_30' && strcol(2) eq 'tri3' && strcol(4) eq word(methods, i) ? 100 * column(c) : NaN):5 with linespoints pt symbol[i] ps 1.3 lw 1.5 lc rgb colour[i] title word(methods, i), \
+      for [i = 1:4] csv skip 1 using (strcol(1) eq 'oblique_30' && strcol(2) eq 'tri3' && strcol(4) eq word(methods, i) ? 100 * column(c) : NaN):5:3 with labels offset 1.3,0.5 font ',9' tc rgb colour[i] notitle
   }
   unset multiplot
 }
