@@ -236,7 +236,8 @@ bool Compliance::move(Geometry& geometry, std::uint32_t node, const Vector2& x_m
     return true;
   };
   if (!add_cells(-1.0)) return false;
-  if (geometry.moved() == capacity::adapted_nodes && !geometry.is_moved(node)) return false;
+  const bool moved_before = geometry.is_moved(node);
+  if (geometry.moved() == capacity::adapted_nodes && !moved_before) return false;
   geometry.move(node, x_m);
   const std::size_t size = 2 * patch.nodes;
 
@@ -265,7 +266,10 @@ bool Compliance::move(Geometry& geometry, std::uint32_t node, const Vector2& x_m
     good = solve_right(system, patch.m, size);
   }
   if (!good) {
-    geometry.move(node, before);
+    if (moved_before)
+      geometry.move(node, before);
+    else
+      geometry.take_back();
     return false;
   }
   for (std::size_t i = 0; i < size; ++i)

@@ -55,6 +55,8 @@ class Geometry {
 
   // Mesh adaptation: this node lies at x from now on. Precondition: moved() < capacity::adapted_nodes.
   void move(std::uint32_t node, const Vector2& x_m) noexcept;
+  // Takes back the latest move, of a node that had not been moved before.
+  void take_back() noexcept { --moved_count_; }
   [[nodiscard]] std::size_t moved() const noexcept { return moved_count_; }
   [[nodiscard]] bool is_moved(std::uint32_t node) const noexcept;
   void restore() noexcept { moved_count_ = 0; }

@@ -143,7 +143,7 @@ void Solver::set_axial(std::size_t i, double axial_n) noexcept {
 
 // Takes the tick's frames and bounds: a slipping contact keeps its lateral force in the turned frame and sits on its bound.
 void Solver::turn(std::span<const Target> target) noexcept {
-  bool turned = false;
+  std::size_t first_turned = unknowns_;
   for (std::size_t i = 0; i < size_; ++i) {
     Contact& c = contact_[i];
     const Target& now = target[i];
@@ -156,14 +156,13 @@ void Solver::turn(std::span<const Target> target) noexcept {
     if (tangent_[i] != now.tangent) {
       tangent_[i] = now.tangent;
       if (slipping(c.state)) {
-        turned = true;
         const Vector2 n = normal(now.tangent);
         c.force_n = {c.axial_n * now.tangent[0] + c.lateral_n * n[0], c.axial_n * now.tangent[1] + c.lateral_n * n[1]};
         force_[2 * i] = c.force_n[0];
         force_[2 * i + 1] = c.force_n[1];
         evaluated_ = false;
-        for (std::size_t k = 0; k < valid_; ++k)
-          if (order_[k].contact == i) valid_ = k;
+        for (std::size_t k = 0; k < first_turned; ++k)
+          if (order_[k].contact == i) first_turned = k;
       } else {
         c.axial_n = dot(c.force_n, now.tangent);
         c.lateral_n = dot(c.force_n, normal(now.tangent));
@@ -171,12 +170,14 @@ void Solver::turn(std::span<const Target> target) noexcept {
     }
     if (slipping(c.state)) set_axial(i, c.state == State::SlipForward ? now.upper_n : now.lower_n);
   }
-  // Stuck contacts first: their rows outlive the next turn.
-  if (turned) {
+  // Stuck contacts first: their rows outlive the next turn. From the first turned one on, whatever the factor holds: the order, and with it
+  // every bit, must not depend on what was skipped. (A change of state above can only have cut the factor before a shifted place.)
+  valid_ = std::min(valid_, first_turned);
+  if (first_turned < unknowns_) {
     std::array<Unknown, 2 * capacity> slipping_ones;
-    std::size_t kept = valid_;
+    std::size_t kept = first_turned;
     std::size_t put_off = 0;
-    for (std::size_t k = valid_; k < unknowns_; ++k) {
+    for (std::size_t k = first_turned; k < unknowns_; ++k) {
       if (order_[k].direction == Direction::Normal)
         slipping_ones[put_off++] = order_[k];
       else
@@ -328,12 +329,14 @@ void Solver::judge(std::span<const Target> target, Violations& v) noexcept {
 }
 
 Solution Solver::solve(std::span<const Target> target) noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   Solution solution;
   for (std::size_t i = 0; i < size_; ++i) {
     const Target& t = target[i];
     const bool finite =
         std::isfinite(t.tangent[0]) && std::isfinite(t.tangent[1]) && std::isfinite(t.gap_m[0]) && std::isfinite(t.gap_m[1]);
-    if (!finite || !(t.lower_n <= t.upper_n)) {
+    const bool bounded = t.lower_n <= t.upper_n && t.lower_n < infinity && t.upper_n > -infinity;
+    if (!finite || !bounded) {
       solution.status = SolverStatus::NotFinite;
       return solution;
     }
@@ -373,7 +376,7 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     } else {
       begin = static_cast<std::size_t>(v.count) - 1;
     }
-    for (std::size_t k = begin; k < static_cast<std::size_t>(v.count); ++k) {
+    for (std::size_t k = begin; k < static_cast<std::size_t>(v.count) && solution.pivots < max_pivots; ++k) {
       const std::size_t i = v.contact[k];
       set_state(i, v.becomes[k]);
       ++solution.pivots;
@@ -382,7 +385,13 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
     evaluate();
   }
   if (limited) {
-    for (std::size_t i = 0; i < size_; ++i) set_axial(i, std::clamp(contact_[i].axial_n, target[i].lower_n, target[i].upper_n));
+    // A stuck contact that is cut to its bound slips: its owner has to know.
+    for (std::size_t i = 0; i < size_; ++i) {
+      const double axial_n = contact_[i].axial_n;
+      if (contact_[i].state == State::Stuck && axial_n > target[i].upper_n) set_state(i, State::SlipForward);
+      if (contact_[i].state == State::Stuck && axial_n < target[i].lower_n) set_state(i, State::SlipBackward);
+      set_axial(i, std::clamp(axial_n, target[i].lower_n, target[i].upper_n));
+    }
     evaluate();
     judge(target, v);
   }

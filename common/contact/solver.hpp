@@ -36,7 +36,7 @@ enum class SolverStatus : std::uint8_t {
   Ok,
   PivotLimit,      // the bound on pivots was hit: forces are within their bounds, the residual says how far they are from the solution
   IllConditioned,  // the residual stays above the tolerance
-  NotFinite,       // an input is not finite or a lower bound above its upper one: nothing was changed
+  NotFinite,       // an input is not finite, a lower bound above its upper one, or a force would have to be infinite: nothing was changed
 };
 
 struct Target {

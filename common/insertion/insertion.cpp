@@ -79,7 +79,8 @@ bool Insertion::place_explicit() noexcept {
   for (std::size_t i = 0; i < law.explicit_count; ++i) {
     const Vector2 from_base{law.explicit_point_m[i][0] - base[0], law.explicit_point_m[i][1] - base[1]};
     const double lateral = axis_[0] * from_base[1] - axis_[1] * from_base[0];
-    if (!(std::abs(lateral) <= explicit_point_tolerance_m) || !set_.place(law.explicit_point_m[i])) {
+    const bool on_shaft = std::abs(lateral) <= explicit_point_tolerance_m && dot(axis_, from_base) >= -explicit_point_tolerance_m;
+    if (!on_shaft || !set_.place(law.explicit_point_m[i])) {
       set_.clear();
       return false;
     }
@@ -135,8 +136,10 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   }
   if (base.theta_rad != pose_.theta_rad || !started_) axis_ = {std::cos(base.theta_rad), std::sin(base.theta_rad)};
   if (started_ && density_.depends_on_speed()) {
-    const double speed = dot(axis_, {base.x_m - pose_.x_m, base.y_m - pose_.y_m}) / dt_s;
-    speed_m_s_ += (speed - speed_m_s_) * dt_s / (speed_filter_s + dt_s);
+    // Without a division by the time step, which may be next to nothing.
+    const double way_m = dot(axis_, {base.x_m - pose_.x_m, base.y_m - pose_.y_m});
+    const double speed = (speed_m_s_ * speed_filter_s + way_m) / (speed_filter_s + dt_s);
+    if (std::isfinite(speed)) speed_m_s_ = speed;
     shaft_n_per_m_ = density_.shaft_n_per_m(std::abs(speed_m_s_));
     tip_n_per_m_ = density_.tip_n_per_m(std::abs(speed_m_s_));
   }

@@ -158,8 +158,13 @@ std::vector<fem::Point> cut_path(const scene::Scene& scene, const std::vector<Ro
 // Subdivide: the mesh is cut along the path that the embedded method finds; then the path's nodes are contacts as they are passed.
 Run subdivided(scene::Scene scene, const std::vector<Row>& path) {
   const std::vector<fem::Point> points = cut_path(scene, path);
-  fem::Mesh mesh = fem::make_mesh(scene.tissue);
-  for (std::size_t i = 1; i < points.size(); ++i) (void)fem::subdivide(mesh, points[i - 1], points[i]);
+  fem::Mesh mesh;
+  try {
+    mesh = fem::make_mesh(scene.tissue);
+    for (std::size_t i = 1; i < points.size(); ++i) (void)fem::subdivide(mesh, points[i - 1], points[i]);
+  } catch (const fem::Error& error) {
+    throw config::UserError(fmt::format("{}: {}", scene.file.string(), error.what()));
+  }
   scene.contact->method = contact::Method::Snap;
   return {scene, condense::plan(scene, std::move(mesh), condense::WithVisible::No)};
 }
@@ -170,6 +175,12 @@ std::string off_shaft(const scene::Scene& scene, const Pose& base) {
     const double x = law.explicit_point_m[i][0];
     const double y = law.explicit_point_m[i][1];
     const double lateral = std::cos(base.theta_rad) * (y - base.y_m) - std::sin(base.theta_rad) * (x - base.x_m);
+    const double axial = std::cos(base.theta_rad) * (x - base.x_m) + std::sin(base.theta_rad) * (y - base.y_m);
+    if (axial < -Insertion::explicit_point_tolerance_m)
+      return fmt::format(
+          "contact.points_m: point {} ({}, {}) m lies {:.3g} m behind the base of the first path row (({}, {}) m, theta {} rad); "
+          "begin the path with the base in front of all points",
+          i + 1, x, y, -axial, base.x_m, base.y_m, base.theta_rad);
     if (std::abs(lateral) > Insertion::explicit_point_tolerance_m)
       return fmt::format(
           "contact.points_m: point {} ({}, {}) m lies {:.3g} m beside the shaft of the first path row (base ({}, {}) m, theta {} rad); "

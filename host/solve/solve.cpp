@@ -8,6 +8,7 @@
 
 #include "common/config/new_file.hpp"
 #include "common/config/user_error.hpp"
+#include "common/fem/nonlinear.hpp"
 #include "common/fem/statics.hpp"
 #include "common/fem/stress.hpp"
 #include "common/scene/scene.hpp"
@@ -34,6 +35,43 @@ Equilibrium solve_linear(const fem::Mesh& mesh, const fem::Tissue& tissue, const
   found.residual_n = found.internal_n - load;
   for (Eigen::Index i = 0; i < load.size(); ++i)
     if (statics.supported(i)) found.residual_n[i] = 0.0;
+  return found;
+}
+
+// Forces of the deformed elements on their nodes, summed without the solver.
+Eigen::VectorXd internal_forces(const fem::Mesh& mesh, const fem::Tissue& tissue, const Eigen::VectorXd& u) {
+  const auto elasticity = fem::elasticities(mesh, tissue);
+  const auto zone = fem::zones_of(mesh, tissue.zones);
+  const int d = mesh.dimension();
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
+  element::Values own;
+  element::Values force;
+  element::Stiffness tangent;
+  for (std::size_t e = 0; e < mesh.element.size(); ++e) {
+    const auto row = [&](int k) { return mesh.element[e][static_cast<std::size_t>(k / d)] * d + k % d; };
+    own.setZero();
+    for (int k = 0; k < mesh.nodes_per_element() * d; ++k) own[k] = u[row(k)];
+    // Inverted cannot be: the solver has refused such a mesh.
+    (void)element::response(mesh.type, tissue.integration, mesh.corners(e), elasticity[static_cast<std::size_t>(zone[e])],
+                            tissue.thickness_m, own, force, tangent);
+    for (int k = 0; k < mesh.nodes_per_element() * d; ++k) sum[row(k)] += force[k];
+  }
+  return sum;
+}
+
+Equilibrium solve_nonlinear(const fem::Mesh& mesh, const fem::Tissue& tissue, const Eigen::VectorXd& load) {
+  const fem::NonlinearResult result = fem::solve_green_lagrange(mesh, tissue, load);
+  if (!result.converged)
+    throw fem::Error(fmt::format("no equilibrium beyond {:.3g} of the loads: {}; lower the loads, or take strain = \"linear\"",
+                                 result.load_fraction, result.failure));
+  Equilibrium found;
+  found.displacement_m = result.displacement_m;
+  found.internal_n = internal_forces(mesh, tissue, found.displacement_m);
+  found.residual_n = found.internal_n - load;
+  const std::vector<bool> supported = fem::supported_degrees_of_freedom(mesh, tissue.supports);
+  for (std::size_t i = 0; i < supported.size(); ++i)
+    if (supported[i]) found.residual_n[static_cast<Eigen::Index>(i)] = 0.0;
+  found.iterations = result.iterations;
   return found;
 }
 
@@ -119,7 +157,8 @@ SolveSummary run_solve(const SolveOptions& options, const std::atomic<bool>& sto
     go_on();
     if (static_cast<std::size_t>(loads.force_n.size()) > large)
       options.progress(fmt::format("{} nodes, {} unknowns: assembling, factoring, solving …", mesh.node.size(), loads.force_n.size()));
-    const Equilibrium found = solve_linear(mesh, scene.tissue, loads.force_n);
+    const Equilibrium found = scene.tissue.strain == fem::Strain::GreenLagrange ? solve_nonlinear(mesh, scene.tissue, loads.force_n)
+                                                                                : solve_linear(mesh, scene.tissue, loads.force_n);
     go_on();
     if (static_cast<std::size_t>(loads.force_n.size()) > large) options.progress("writing the results …");
     write_table(table.stream(), mesh, found.displacement_m);

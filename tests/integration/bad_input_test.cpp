@@ -10,25 +10,10 @@
 
 #include "harness.hpp"
 #include "host/rig/client.hpp"
+#include "refusal.hpp"
 
 namespace trocar::testing {
 namespace {
-
-using Words = std::vector<std::string>;
-
-constexpr double answer_s = 30.0;
-
-// Exit code, and one line on stderr that begins with the program's name and holds all the words.
-void expect_refusal(const Scratch& scratch, const std::string& name, const Words& arguments, const Words& words) {
-  Program program(scratch, name, arguments);
-  SCOPED_TRACE(name + (arguments.empty() ? std::string() : " " + arguments.front()));
-  EXPECT_EQ(program.wait(answer_s), 1) << program.out();
-  const std::string said = program.errors();
-  EXPECT_EQ(said.rfind(name + ": ", 0), 0U) << said;
-  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
-  EXPECT_EQ(said.find("  "), std::string::npos) << said;
-  for (const std::string& word : words) EXPECT_NE(said.find(word), std::string::npos) << "misses \"" << word << "\": " << said;
-}
 
 std::string domain() { return std::to_string(own_domain()); }
 

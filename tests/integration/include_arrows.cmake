@@ -5,11 +5,11 @@ cmake_minimum_required(VERSION 3.25)
 
 set(rules
   "^common/ -> ^(hal|firmware|sim_plant|host)/"
-  "^common/(core|mechanism|rig)$ -> ^common/(config|wire|capture|fem|experiment)/"
+  "^common/(core|mechanism|rig)$ -> ^common/(config|wire|capture|fem|scene|experiment)/"
   "^common/core$ -> ^common/(mechanism|rig)/"
-  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/experiment)/"
+  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/experiment)/"
   "^firmware/ -> ^(sim_plant|host)/"
-  "^firmware/(control|safety|controller)$ -> ^common/(config|wire|capture|fem|experiment)/"
+  "^firmware/(control|safety|controller)$ -> ^common/(config|wire|capture|fem|scene|experiment)/"
   "^sim_plant/ -> ^host/"
   "^sim_plant/(mechanism|nodes|phantom|plant)$ -> ^firmware/"
   "^host/ -> ^(hal|firmware|sim_plant)/")

@@ -43,10 +43,9 @@ TEST(ElementNoAllocation, InAnyKernel) {
   Eigen::Vector3d natural;
 
   const std::size_t at_start = allocations;
-  const Eigen::VectorXd counted = Eigen::VectorXd::Zero(100);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  void* volatile counted = ::operator new(1);
+  ::operator delete(counted);
   ASSERT_GT(allocations, at_start);  // the counter works
-#endif
   const std::size_t before = allocations;
   bool good = true;
   for (const Integration integration : {Integration::Full, Integration::BBar}) {
@@ -65,7 +64,6 @@ TEST(ElementNoAllocation, InAnyKernel) {
   const std::size_t after = allocations;
   EXPECT_EQ(after, before);
   EXPECT_TRUE(good);
-  EXPECT_EQ(counted.size(), 100);
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+# The firmware loads no library that is under the GPL (CHOLMOD's supernodal module, gmsh) nor the BLAS, directly or through another.
+# Needs RIG and HOST (programs). Positive control: the host's program does load CHOLMOD, so this looks in the right place.
+cmake_minimum_required(VERSION 3.25)
+function(libraries program)
+  execute_process(COMMAND ldd ${program} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "ldd ${program}: ${errors}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+set(forbidden "lib(cholmod|gmsh|openblas|blas|lapack|metis|amd)[.]")
+libraries(${HOST})
+if(NOT output MATCHES "libcholmod[.]")
+  message(FATAL_ERROR "${HOST} does not load CHOLMOD, so this test proves nothing:\n${output}")
+endif()
+libraries(${RIG})
+if(output MATCHES "${forbidden}")
+  message(FATAL_ERROR "${RIG} loads what it must not:\n${output}")
+endif()
+if(NOT output MATCHES "libc[.]")
+  message(FATAL_ERROR "ldd found nothing in ${RIG}:\n${output}")
+endif()

@@ -1,0 +1,51 @@
+// A program of its own, because it replaces the allocator: once opened, a step allocates nothing.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "hand.hpp"
+
+namespace {
+std::size_t allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  std::abort();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace trocar::insertion {
+namespace {
+
+using namespace testing;
+
+TEST(InsertionNoAllocation, ThroughInsertionTurnAdaptationAndWithdrawal) {
+  const reference::GridImage grid({.element = fem::Type::Tri3, .nodes_x = 13, .nodes_y = 13});
+  for (const contact::Method method : {contact::Method::Embedded, contact::Method::Snap, contact::Method::Adapt}) {
+    Hand hand(grid, method);
+    hand.law().velocity = rising_law();
+    hand.open();
+    const std::size_t before = allocations;
+    ASSERT_GT(before, 0u);  // the counter works
+    hand.move(0.001, 0.07, 0.05);
+    const std::size_t most_contacts = hand.model().contacts();
+    const std::size_t moved = hand.model().working_set().geometry().moved();
+    hand.move(0.001, 0.0, -0.05);
+    hand.move(0.0, -0.09);
+    hand.pose.x_m = std::nan("");
+    hand.step();
+    hand.model().reset();
+    const std::size_t after = allocations;
+    EXPECT_EQ(after, before);
+    EXPECT_GT(most_contacts, 6u);
+    EXPECT_EQ(moved > 0, method == contact::Method::Adapt);
+    EXPECT_EQ(hand.model().contacts(), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace trocar::insertion
