@@ -47,6 +47,7 @@ class Hand {
 
   // Change the law, the needle, then open.
   [[nodiscard]] contact::Law& law() { return law_; }
+  [[nodiscard]] contact::Method method() const { return law_.method; }
   [[nodiscard]] model::Image& image() { return image_; }
   void open() {
     image_.law = &law_;
@@ -101,8 +102,25 @@ class Hand {
 struct Balance {
   double wrench{};      // largest difference in N, and in N m over the needle's length
   double off_axis_m{};  // farthest that a contact's tissue lies from the needle's axis
-  double stretch_m{};   // most that a tie gives way by regularisation, the last segment's apart
+  double stretch_m{};   // most that a tie gives way by more than its ridge, the last segment's apart
 };
+
+// What elements miss on a line load through them: a tent of height q |d| / (2 C t), interpolated, by its two components. Plane stress.
+[[nodiscard]] inline Vector2 ridge_m(const reference::GridImage& whole, const contact::WorkingSet::Point& segment, double length_m,
+                                     const Vector2& force_n) {
+  const double size = std::hypot(segment.heading[0], segment.heading[1]);
+  const Vector2 t{segment.heading[0] / size, segment.heading[1] / size};
+  double distance_m = 0.0;
+  for (std::uint32_t k = 0; k < segment.at.count; ++k) {
+    const fem::Point& node = whole.mesh().node[segment.at.node[k]];
+    distance_m += segment.at.weight[k] * std::abs(t[0] * (node[1] - segment.begin_m[1]) - t[1] * (node[0] - segment.begin_m[0]));
+  }
+  const auto& [young_pa, poisson] = whole.image().tissue.material.front();
+  const double tent = distance_m / (2.0 * length_m * whole.image().tissue.thickness_m);
+  const double axial_m = tent * (t[0] * force_n[0] + t[1] * force_n[1]) * 2.0 * (1.0 + poisson) / young_pa;
+  const double lateral_m = tent * (t[0] * force_n[1] - t[1] * force_n[0]) * (1.0 - poisson * poisson) / young_pa;
+  return {t[0] * axial_m - t[1] * lateral_m, t[1] * axial_m + t[0] * lateral_m};
+}
 
 // The contact forces on the nodes of the whole sparse mesh (as adapted): the displacements that these cause say where the contacts
 // are, and with that what the base must apply.
@@ -128,7 +146,12 @@ struct Balance {
     const contact::Block tied = set.solver().compliance(i, i);
     const Vector2& f = set.solver().contact(i).force_n;
     Vector2 x{(tied[0] - own(0, 0)) * f[0] + (tied[1] - own(0, 1)) * f[1], (tied[2] - own(1, 0)) * f[0] + (tied[3] - own(1, 1)) * f[1]};
-    if (i + 1 < set.size()) balance.stretch_m = std::max(balance.stretch_m, std::hypot(x[0], x[1]));
+    if (i + 1 < set.size()) {
+      Vector2 ridge{};
+      if (hand.method() == contact::Method::Embedded)
+        ridge = ridge_m(whole, set.point(i), set.point(i + 1).path_m - set.point(i).path_m, f);
+      balance.stretch_m = std::max(balance.stretch_m, std::hypot(x[0] - ridge[0], x[1] - ridge[1]));
+    }
     for (std::uint32_t k = 0; k < at.count; ++k)
       for (std::size_t c = 0; c < 2; ++c)
         x[c] += at.weight[k] * (whole.mesh().node[at.node[k]][c] + u(static_cast<Eigen::Index>(2 * at.node[k] + c)));
