@@ -5,8 +5,4 @@ trocar_library(tests/benchmarks/accuracy
 trocar_program(accuracy_benchmark SOURCES accuracy_benchmark.cpp DEPENDS tests_benchmarks_accuracy fmt::fmt)
 # That it runs to its end and finds the force continuous; its figures are for people.
 add_test(NAME accuracy_benchmark_quick COMMAND accuracy_benchmark --quick --out ${CMAKE_CURRENT_BINARY_DIR}/accuracy_quick)
-<<<<<<< HEAD
-set_tests_properties(accuracy_benchmark_quick PROPERTIES LABELS benchmark TIMEOUT 60)
-=======
 set_tests_properties(accuracy_benchmark_quick PROPERTIES LABELS benchmark TIMEOUT 300)
->>>>>>> main
