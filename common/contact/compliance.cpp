@@ -58,6 +58,36 @@ bool solve_right(std::array<std::array<double, N>, N>& a, std::array<std::array<
 
 constexpr std::size_t transfer_index(std::size_t l, std::size_t k) noexcept { return k * (k - 1) / 2 + l; }
 
+// Where stiffnesses differ by many orders of magnitude the update is a difference of numbers that nearly cancel. A' = A - A M A has to
+// fulfil A' + A dK A' = A, and to keep the diagonal of a compliance.
+template <std::size_t N>
+bool accurate(const std::array<std::array<double, N>, N>& a, const std::array<std::array<double, N>, N>& change,
+              const std::array<std::array<double, N>, N>& m, std::size_t n) noexcept {
+  constexpr double largest_error = 1e-7;  // of the largest entry of A'
+  using Matrix = std::array<std::array<double, N>, N>;
+  const auto product = [n](const Matrix& x, const Matrix& y) {
+    Matrix z{};
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t k = 0; k < n; ++k)
+        for (std::size_t j = 0; j < n; ++j) z[i][j] += x[i][k] * y[k][j];
+    return z;
+  };
+  Matrix moved = product(product(a, m), a);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      moved[i][j] = a[i][j] - moved[i][j];
+      largest = std::max(largest, std::abs(moved[i][j]));
+    }
+    if (!(moved[i][i] >= 0.0)) return false;
+  }
+  const Matrix back = product(product(a, change), moved);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      if (!(std::abs(moved[i][j] + back[i][j] - a[i][j]) <= largest_error * largest)) return false;
+  return true;
+}
+
 double twice_area(const Geometry& geometry, const model::Cell& cell) noexcept {
   double area = 0.0;
   for (std::size_t k = 0; k < cell.count; ++k) {
@@ -263,7 +293,7 @@ bool Compliance::move(Geometry& geometry, std::uint32_t node, const Vector2& x_m
         for (std::size_t j = 0; j < size; ++j) system[i][j] += compliance[i][k] * change[k][j];
     }
     patch.m = change;
-    good = solve_right(system, patch.m, size);
+    good = solve_right(system, patch.m, size) && accurate(compliance, change, patch.m, size);
   }
   if (!good) {
     if (moved_before)

@@ -31,7 +31,8 @@ class Compliance {
   [[nodiscard]] Block coupling(const Embedding& a, const Embedding& b) noexcept;
 
   // Moves a node to x: false, and nothing changed, when its cells are not all candidates, a cell would be turned inside out or squeezed to
-  // less than a hundredth, or a capacity is exhausted. `geometry` is the state before the move and is moved along.
+  // less than a hundredth, a capacity is exhausted, or the update would lose more than seven digits (layers of extremely different
+  // stiffness). `geometry` is the state before the move and is moved along.
   [[nodiscard]] bool move(Geometry& geometry, std::uint32_t node, const Vector2& x_m) noexcept;
   [[nodiscard]] std::size_t moves() const noexcept { return moves_; }
   // What the latest move subtracted from the compliance between two nodes.

@@ -3,15 +3,15 @@
 // Path. The tip's own place X in the reference mesh solves X + u(X) = tip. While X moves on into new tissue the path grows, and while it
 // comes back the path shrinks; complete withdrawal forgets it. Lengths along the path are material lengths.
 //   Embedded: the path is cut into segments of law.spacing_m; contact j is the mean over segment j (a constant force density along it,
-//     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of a
-//     thirty-second of the spacing. While it is short its tie is softened by its own compliance times (spacing / length - 1), so that
-//     beginning or leaving it does not kick.
+//     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of 1/128 of
+//     the spacing. While it is short its tie across the shaft is softened by its own compliance times (spacing / length - 1), in steps of
+//     1/512 of the spacing, so that beginning or leaving it does not kick. A segment keeps the course that was cut: coming back follows it.
 //     In planar tissue its own compliance has the ridge added that a line load makes of the displacement and that elements cannot bend to,
 //     sum w_k |d_k| / (2 C t) per density, d_k the nodes' distances from the line: without it an oblique needle is some 3 % too stiff on
 //     80 x 80 elements (tests/benchmarks/accuracy_benchmark.cpp). displacement_m() is the elements' own, without the ridge.
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
-//   in the
-//     reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the tip.
+//     in the reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the
+//     tip.
 //   Explicit: points given by the scene, none added or removed.
 // Thresholds: the density times the length that a contact carries, so their sum is the density times the path. Over the last tip_zone_m of
 // the path ever cut the tip's density replaces the shaft's, in the upper bound alone: only while new tissue is cut. Regularisation: 1e-6

@@ -18,8 +18,8 @@ inline constexpr std::size_t contacts = 64;           // contact points between 
 inline constexpr std::size_t embedding_nodes = 32;    // nodes that one contact is tied to
 inline constexpr std::size_t velocity_law_rows = 16;  // points of a force density over speed
 inline constexpr std::size_t cells_per_bucket = 64;   // candidate cells that one search looks at
-inline constexpr std::size_t ring_cells = 12;          // cells around a node that mesh adaptation may move
-inline constexpr std::size_t patch_nodes = 9;          // nodes of the cells around a node that mesh adaptation may move
-inline constexpr std::size_t adapted_nodes = 40;       // nodes moved by mesh adaptation
+inline constexpr std::size_t ring_cells = 12;         // cells around a node that mesh adaptation may move
+inline constexpr std::size_t patch_nodes = 9;         // nodes of the cells around a node that mesh adaptation may move
+inline constexpr std::size_t adapted_nodes = 40;      // nodes moved by mesh adaptation
 
 }  // namespace trocar::capacity

@@ -27,7 +27,7 @@ struct Needle {
 
 // What a scene takes of common/core/capacities.hpp.
 struct Need {
-  std::uint32_t contacts{};         // a needle that is all in tissue, or the explicit ones
+  std::uint32_t contacts{};  // a needle that is all in tissue, or the explicit ones
   std::uint32_t cells_per_bucket{};
   std::uint32_t ring_cells{};  // around a node that may be moved
 };

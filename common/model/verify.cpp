@@ -231,7 +231,8 @@ ImageStatus verify(const Image& image) noexcept {
   if (!tissue_ok(t)) return ImageStatus::BadTissue;
   if (!positive(image.needle.length_m) || !not_negative(image.needle.radius_m)) return ImageStatus::BadNeedle;
   const Need& need = image.need;
-  if (t.node_m.size() > max_nodes || need.contacts > capacity::contacts || need.cells_per_bucket > capacity::cells_per_bucket || need.ring_cells > capacity::ring_cells) {
+  if (t.node_m.size() > max_nodes || need.contacts > capacity::contacts || need.cells_per_bucket > capacity::cells_per_bucket ||
+      need.ring_cells > capacity::ring_cells) {
     return ImageStatus::TooLarge;
   }
   if (t.node_m.empty() || t.node_flags.size() != t.node_m.size() || t.cell.empty() || t.cell.size() > 4 * max_nodes ||

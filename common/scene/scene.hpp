@@ -9,16 +9,17 @@
 //       file = "block.msh"                           gmsh, relative to the scene file
 //       element = "tri3" | "quad4" | "tet4" | "hex8"
 //       spacing = one entry an axis: "uniform" or { towards_m, smallest_m } or { towards_m, ratio }: a node lies at towards_m, element
-//       sizes grow
-//                 away from it by one factor, from smallest_m (the factor follows) or by `ratio` (the smallest follows); `nodes` holds
+//         sizes grow away from it by one factor, from smallest_m (the factor follows) or by `ratio` (the smallest follows); `nodes` holds
 //     (integration = "full" | "bbar"), (strain = "linear" | "green_lagrange")
-//   [[tissue.material]] young_pa, poisson, (box = [[x0, y0(, z0)], [x1, y1(, z1)]]), (region = "name")     later entries override earlier
-//   ones
+//   [[tissue.material]] young_pa, poisson, (box = [[x0, y0(, z0)], [x1, y1(, z1)]]), (region = "name")
+//     later entries override earlier ones
 //   [[tissue.support]] where = "x_min" … "z_max" | "group", or box; fix = ["x", "y", "z"]
 //   [needle] model = "rigid" | "beam" | "thesis", length_m, gauge = "22G" or outer_m, inner_m, young_pa (a rigid one needs none),
-//   (elements) [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m, (velocity_law =
-//   "none" or a name below),
-//     (spacing_m), (points_m = [[x, y], …] with slip_force_n = […]: explicit contacts, and the three densities may be left out),
+//     (elements)
+//   [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m,
+//     (velocity_law = "none" or a name below),
+//     (spacing_m: of embedded contacts, 1.5 edges unless stated),
+//     (points_m = [[x, y], …] with slip_force_n = […]: explicit contacts, and the three densities may be left out),
 //     (corridor = { from_m, to_m, half_width_m }), (plane_z_m), (visible = side, group or "all"), (storage = "float64" | "float32")
 //   [[velocity_law]] name, speed_m_s, shaft_n_per_m, tip_n_per_m: three arrays of one length, speeds increasing. With a law its densities
 //     hold at every speed, and shaft_n_per_m and tip_n_per_m may be left out.

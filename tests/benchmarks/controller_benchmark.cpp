@@ -25,8 +25,7 @@ BENCHMARK(ControllerTick);
 void LockStepTick(benchmark::State& run) {
   const std::filesystem::path share{TROCAR_SHARE};
   const rig::Rig rig = config::read_rig(share / "rigs/ubc_twin.toml");
-  sim_plant::Bench bench(rig, sim_plant::read_plant(share / "plants/ubc_twin.toml"),
-                         scene::read_scene(share / "scenes/phantom.toml"), 1);
+  sim_plant::Bench bench(rig, sim_plant::read_plant(share / "plants/ubc_twin.toml"), scene::read_scene(share / "scenes/phantom.toml"), 1);
   const auto send = [&](CommandKind kind, int ticks) {
     bench.mail().commands.push({.session = 1, .id = 1, .kind = kind});
     for (int i = 0; i < ticks; ++i) bench.tick();

@@ -246,7 +246,7 @@ TEST(Compile, GivesTheSameBytesAgain) {
 }
 
 TEST(Compile, TakesTheMeshForTheSpacingOfContacts) {
-  scene::Scene s = planar_scene();  // elements of 10 mm
+  scene::Scene s = planar_scene();                                       // elements of 10 mm
   EXPECT_NEAR(open(compile_to_memory(s)).law->spacing_m, 0.015, 1e-12);  // 1.5 of them
   EXPECT_EQ(open(compile_to_memory(s)).need.contacts, 7U);
   s.contact->spacing_m = 0.004;
