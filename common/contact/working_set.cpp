@@ -11,8 +11,8 @@ constexpr double point_regularisation = 1e-12;
 constexpr double resize_step = 1.0 / 128.0;  // of the spacing: how finely the last segment's weights follow the tip
 constexpr double soften_step = 1.0 / 512.0;  // and the softness of its tie
 constexpr double softness_of_short = 0.1;    // of its own compliance: about what a whole segment's is once its neighbours stick too
-// gamma of the jumps. Between 0.1 and 0.15 no error that accuracy_benchmark measures changes by a third; below 0.05 forces along grid lines
-// alternate.
+// Of the jumps. Between 0.1 and 0.15 hardly any error that accuracy_benchmark measures changes by a third, but without them forces along
+// grid lines alternate.
 constexpr double jump_stabilisation = 0.15;
 constexpr int most_cells = 512;  // that one walk crosses
 
