@@ -111,9 +111,9 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
   plan.law = *scene.contact;
   const double reach = reach_m(c, scene.needle->length_m);
   const bool given = plan.law.spacing_m > 0.0;
-  // One force per edge alternates along the path: the edges' averages hardly feel such a load (inf-sup). 1.5 edges keep it off, 2 cost
-  // detail.
-  constexpr double edges_per_segment = 1.5;
+  // One force per edge would alternate along the path: the edges' averages hardly feel such a load (inf-sup). In planar tissue the contacts
+  // are stabilised against it (contact/working_set.hpp); in a solid 1.5 edges keep it off, and 2 cost detail.
+  const double edges_per_segment = scene.tissue.model == fem::Model::Solid ? 1.5 : 1.0;
   if (!given) plan.law.spacing_m = std::max(edges_per_segment * c.edge_length_m, reach / static_cast<double>(capacity::contacts));
   if (plan.law.explicit_count > capacity::contacts)
     throw fem::Error(

@@ -10,13 +10,20 @@ constexpr double segment_regularisation = 1e-6;
 constexpr double point_regularisation = 1e-12;
 constexpr double resize_step = 1.0 / 128.0;  // of the spacing: how finely the last segment's weights follow the tip
 constexpr double soften_step = 1.0 / 512.0;  // and the softness of its tie
-constexpr int most_cells = 512;              // that one walk crosses
+constexpr double softness_of_short = 0.1;    // of its own compliance: about what a whole segment's is once its neighbours stick too
+// Of the jumps. Between 0.1 and 0.15 hardly any error that accuracy_benchmark measures changes by a third, but without them forces along
+// grid lines alternate.
+constexpr double jump_stabilisation = 0.15;
+constexpr int most_cells = 512;  // that one walk crosses
 
 Vector2 plus(const Vector2& a, const Vector2& b) noexcept { return {a[0] + b[0], a[1] + b[1]}; }
 Vector2 minus(const Vector2& a, const Vector2& b) noexcept { return {a[0] - b[0], a[1] - b[1]}; }
 Vector2 scaled(const Vector2& a, double factor) noexcept { return {a[0] * factor, a[1] * factor}; }
 double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
 double length(const Vector2& a) noexcept { return std::hypot(a[0], a[1]); }
+void add(Block& to, const Block& what, double factor = 1.0) noexcept {
+  for (std::size_t k = 0; k < 4; ++k) to[k] += factor * what[k];
+}
 double overlap(double a0, double a1, double b0, double b1) noexcept { return std::max(0.0, std::min(a1, b1) - std::max(a0, b0)); }
 
 }  // namespace
@@ -26,7 +33,7 @@ void WorkingSet::open(const model::Tissue& tissue, const Law& law) noexcept {
   law_ = &law;
   geometry_.open(tissue);
   compliance_.open(tissue);
-  regularisation_ = law.method == Method::Embedded && law.explicit_count == 0 ? segment_regularisation : point_regularisation;
+  regularisation_ = segments() ? segment_regularisation : point_regularisation;
   // A contact tied to supported nodes alone has no compliance of its own; 1 / (E t) is the tissue's scale.
   const double depth = tissue.model == element::Model::Solid ? tissue.edge_length_m : tissue.thickness_m;
   least_compliance_ = 1e-9 / (tissue.material.front().young_pa * depth);
@@ -110,13 +117,56 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexce
   const double added = std::max(regularisation_ * mean, mean < least_compliance_ ? least_compliance_ : 0.0);
   own[0] += added;
   own[3] += added;
-  row_[before] = last_own_ = own;
+  row_[before] = own_[before] = own;
   return before + 1;
+}
+
+// A line load q bends the displacement sharply, by -q |d| / (2 C t) at the distance d, and elements that the line crosses cannot: on the
+// line they miss q / (2 C t) sum w_k |d_k|, nothing where the line runs along edges. C is the shear modulus along the line, that of
+// uniaxial strain across it. And a density that alternates from segment to segment hardly moves elements of their size, though it moves
+// tissue: the jump of density to the predecessor counts. In a solid the force is spread over the needle's cross-section, which the mesh
+// may resolve.
+void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept {
+  if (tissue_->model == element::Model::Solid) return;
+  const Vector2 chord = minus(to_m, from_m);
+  const double length_m = length(chord);
+  const Vector2 t = scaled(chord, 1.0 / length_m);
+  const std::int32_t middle = geometry_.locate(plus(from_m, scaled(chord, 0.5)), tip_cell_);
+  const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(middle < 0 ? tip_cell_ : middle)];
+  const element::Elasticity c = element::elasticity(tissue_->model, tissue_->material[cell.material]);
+  // `scale` over C t, in the axes of the mesh.
+  const auto compliance = [&](double scale) {
+    const double along = scale / (c(2, 2) * tissue_->thickness_m);
+    const double across = scale / (c(0, 0) * tissue_->thickness_m);
+    const double shear = (along - across) * t[0] * t[1];
+    return Block{along * t[0] * t[0] + across * t[1] * t[1], shear, shear, along * t[1] * t[1] + across * t[0] * t[0]};
+  };
+  double distance_m = 0.0;
+  for (std::uint32_t k = 0; k < at.count; ++k) {
+    const Vector2 x = minus(geometry_.node_m(at.node[k]), from_m);
+    distance_m += at.weight[k] * std::abs(t[0] * x[1] - t[1] * x[0]);
+  }
+  // The load's length is a whole segment's from the start: a shorter one is no line on the scale of the elements.
+  const double spacing = law_->spacing_m;
+  add(row_[i], compliance(std::max(0.0, distance_m) / (2.0 * spacing)));
+  if (i > 0) {
+    // f_i - (l_i / l_(i-1)) f_(i-1): a segment that is still short neither holds its predecessor nor is held by it.
+    const double per_edge = tissue_->edge_length_m / spacing;
+    const Block jump = compliance(jump_stabilisation * per_edge * per_edge);
+    const double share = length_m / (spacing * length(point_[i - 1].heading));
+    add(row_[i], jump);
+    add(row_[i - 1], jump, -share);
+    Block before = own_[i - 1];
+    add(before, jump, share * share);
+    solver_.replace_own(i - 1, before);
+  }
+  own_[i] = row_[i];
 }
 
 void WorkingSet::push(const Point& point) noexcept {
   const std::size_t i = size();
   const std::size_t count = make_row(point.at, i);
+  if (segments()) add_unresolved(point.at, point.begin_m, plus(point.begin_m, scaled(point.heading, point.length_m)), i);
   point_[i] = point;
   point_[i].material_m = geometry_.mean_m(point.at);
   solver_.push({row_.data(), count});
@@ -126,21 +176,21 @@ void WorkingSet::pop() noexcept {
   solver_.pop();
   forget_couplings(size());
   // What is the last one now was a whole segment: its tie is not softened.
-  if (size() > 0) last_own_ = solver_.compliance(size() - 1, size() - 1);
+  if (size() > 0 && segments()) solver_.replace_own(size() - 1, own_[size() - 1]);
 }
 
 void WorkingSet::soften_last(const Vector2& tangent) noexcept {
-  if (law_->method != Method::Embedded || law_->explicit_count > 0) return;
+  if (!segments()) return;
   const std::size_t i = size() - 1;
   const double spacing = law_->spacing_m;
   const double covered = path_m_ - point_[i].path_m;
   if (softened_ != i || std::abs(covered - softened_length_m_) >= soften_step * spacing || covered >= spacing)
     softened_length_m_ = std::clamp(covered, soften_step * spacing, spacing);
   softened_ = i;
-  const double softness = 0.5 * (last_own_[0] + last_own_[3]) * (spacing / softened_length_m_ - 1.0);
+  const double softness = softness_of_short * 0.5 * (own_[i][0] + own_[i][3]) * (spacing / softened_length_m_ - 1.0);
   const Vector2 n{-tangent[1], tangent[0]};
-  const Block own{last_own_[0] + softness * n[0] * n[0], last_own_[1] + softness * n[0] * n[1], last_own_[2] + softness * n[0] * n[1],
-                  last_own_[3] + softness * n[1] * n[1]};
+  const Block own{own_[i][0] + softness * n[0] * n[0], own_[i][1] + softness * n[0] * n[1], own_[i][2] + softness * n[0] * n[1],
+                  own_[i][3] + softness * n[1] * n[1]};
   solver_.replace_own(i, own);
 }
 
@@ -221,7 +271,9 @@ void WorkingSet::resize_last(double length_m) noexcept {
   last.length_m = now;
   last.fresh = true;
   forget_couplings(i);
-  solver_.replace(i, {row_.data(), make_row(last.at, i)});
+  const std::size_t count = make_row(last.at, i);
+  add_unresolved(last.at, last.begin_m, end, i);
+  solver_.replace(i, {row_.data(), count});
 }
 
 void WorkingSet::push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept {

@@ -246,13 +246,13 @@ TEST(Compile, GivesTheSameBytesAgain) {
 }
 
 TEST(Compile, TakesTheMeshForTheSpacingOfContacts) {
-  scene::Scene s = planar_scene();                                       // elements of 10 mm
-  EXPECT_NEAR(open(compile_to_memory(s)).law->spacing_m, 0.015, 1e-12);  // 1.5 of them
-  EXPECT_EQ(open(compile_to_memory(s)).need.contacts, 7U);
+  scene::Scene s = planar_scene();  // elements of 10 mm
+  EXPECT_NEAR(open(compile_to_memory(s)).law->spacing_m, 0.010, 1e-12);
+  EXPECT_EQ(open(compile_to_memory(s)).need.contacts, 10U);
   s.contact->spacing_m = 0.004;
   EXPECT_EQ(open(compile_to_memory(s)).law->spacing_m, 0.004);
   EXPECT_EQ(open(compile_to_memory(s)).need.contacts, 25U);
-  s = planar_scene(fem::Type::Quad4, 101);  // of 1 mm: 67 contacts would be too many
+  s = planar_scene(fem::Type::Quad4, 101);  // of 1 mm: 100 contacts would be too many
   s.corridor = scene::Corridor{{0.0, 0.0}, {0.0, 0.1}, 0.001};
   const Plan planned = plan(s);
   EXPECT_EQ(planned.need.contacts, capacity::contacts);

@@ -1,6 +1,7 @@
 // Embedded contacts: nothing may kick, the tip's density follows the cut, the velocity law follows the base.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "hand.hpp"
@@ -104,6 +105,78 @@ TEST(Embedded, MirrorsWithItsScene) {
   EXPECT_NEAR(left.base().fx_n, -right.base().fx_n, 1e-8);
   EXPECT_NEAR(left.base().fy_n, right.base().fy_n, 1e-8);
   EXPECT_NEAR(left.base().tau_nm, -right.base().tau_nm, 1e-9);
+}
+
+// One force per edge along a grid line is the mesh's worst case: nodes hardly feel forces that alternate. Both directions, stuck.
+TEST(Embedded, ForcesDoNotAlternateAlongAGridLine) {
+  for (const fem::Type type : {fem::Type::Quad4, fem::Type::Tri3}) {
+    Hand hand(grid_of(type));
+    hand.law().shaft_n_per_m = hand.law().tip_n_per_m = 1e9;
+    ASSERT_EQ(hand.law().spacing_m, hand.image().tissue.edge_length_m);
+    hand.pose.y_m = 0.0525 - needle_m;
+    hand.open();
+    hand.pose.y_m += 1e-4;
+    hand.step();
+    const contact::Solver& solver = hand.model().working_set().solver();
+    ASSERT_EQ(solver.size(), 11u);
+    // Fewest at a depth inside: forces fall from the entry, then rise to the tip.
+    int turns = 0;
+    for (std::size_t i = 0; i < 10; ++i) {
+      EXPECT_GT(solver.contact(i).axial_n, 0.0) << i;
+      if (i > 0 && i < 9) {
+        const double before = solver.contact(i).axial_n - solver.contact(i - 1).axial_n;
+        const double after = solver.contact(i + 1).axial_n - solver.contact(i).axial_n;
+        turns += before * after < 0.0 ? 1 : 0;
+      }
+    }
+    EXPECT_LE(turns, 2);
+  }
+}
+
+// Beyond the elements' own compliance: what the contacts were given in excess is symmetric and a sum of squares, and forces of one density
+// feel nothing of the part between neighbours.
+TEST(Embedded, JumpsOfDensityAreASumOfSquares) {
+  const reference::GridImage& whole = quads();
+  Hand hand(whole);
+  hand.pose.x_m = 0.0012;  // not along edges: there is a ridge as well
+  hand.pose.y_m = 0.0325 - needle_m;
+  hand.open();
+  const contact::WorkingSet& set = hand.model().working_set();
+  const auto n = static_cast<Eigen::Index>(set.size());
+  ASSERT_EQ(n, 7);
+  Eigen::MatrixXd load = Eigen::MatrixXd::Zero(whole.statics().degrees_of_freedom(), 2 * n);
+  Eigen::MatrixXd tied(2 * n, 2 * n), ridge = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const contact::WorkingSet::Point& point = set.point(k);
+    for (std::uint32_t m = 0; m < point.at.count; ++m)
+      for (Eigen::Index c = 0; c < 2; ++c) load(2 * static_cast<Eigen::Index>(point.at.node[m]) + c, 2 * i + c) += point.at.weight[m];
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const contact::Block b = set.solver().compliance(k, static_cast<std::size_t>(j));
+      tied.block<2, 2>(2 * i, 2 * j) << b[0], b[1], b[2], b[3];
+    }
+    for (Eigen::Index c = 0; c < 2; ++c) {
+      const Vector2 u = ridge_m(whole, point, set.point(1).path_m, {c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0});
+      ridge.block<2, 1>(2 * i, 2 * i + c) << u[0], u[1];
+    }
+  }
+  EXPECT_EQ((tied - tied.transpose()).norm(), 0.0);
+  const Eigen::MatrixXd mesh = load.transpose() * whole.statics().solve(load);
+  const Eigen::MatrixXd jumps = tied - mesh - ridge;
+  const double scale = 0.15 / (whole.image().tissue.thickness_m * whole.image().tissue.material.front().young_pa);
+  const Eigen::VectorXd eigenvalue = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (jumps + jumps.transpose())).eigenvalues();
+  EXPECT_GT(eigenvalue.minCoeff(), -1e-6 * scale);
+  EXPECT_GT(eigenvalue.maxCoeff(), 3.0 * scale);
+  // One density: the last segment is half a one. Softness across the shaft is its tie's own, so only along.
+  Eigen::VectorXd even = Eigen::VectorXd::Zero(2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) even(2 * i + 1) = i + 1 < n ? 1.0 : set.point(static_cast<std::size_t>(i)).length_m / 0.005;
+  EXPECT_LT((jumps * even)(Eigen::seq(1, Eigen::last, 2)).cwiseAbs().maxCoeff(), 1e-5 * mesh.diagonal().maxCoeff());
+  // Alternating: every whole segment yields by both its jumps.
+  Eigen::VectorXd alternating = Eigen::VectorXd::Zero(2 * n);
+  for (Eigen::Index i = 0; i < n - 1; ++i) alternating(2 * i + 1) = i % 2 == 0 ? 1.0 : -1.0;
+  const double shear_pa = whole.image().tissue.material.front().young_pa / (2.0 * (1.0 + whole.image().tissue.material.front().poisson));
+  const double one = 0.15 / (whole.image().tissue.thickness_m * shear_pa);
+  for (Eigen::Index i = 1; i < n - 2; ++i) EXPECT_NEAR((jumps * alternating)(2 * i + 1) * alternating(2 * i + 1), 4.0 * one, 1e-4 * one);
 }
 
 // A needle that is pulled out while it is bent out of its path lets go gently, contact by contact.

@@ -47,6 +47,7 @@ class Hand {
 
   // Change the law, the needle, then open.
   [[nodiscard]] contact::Law& law() { return law_; }
+  [[nodiscard]] contact::Method method() const { return law_.method; }
   [[nodiscard]] model::Image& image() { return image_; }
   void open() {
     image_.law = &law_;
@@ -101,8 +102,49 @@ class Hand {
 struct Balance {
   double wrench{};      // largest difference in N, and in N m over the needle's length
   double off_axis_m{};  // farthest that a contact's tissue lies from the needle's axis
-  double stretch_m{};   // most that a tie gives way by regularisation, the last segment's apart
+  double stretch_m{};   // most that a tie gives way by more than its ridge and jumps, the last two segments' apart
 };
+
+// (along, across) over C t: a compliance along and across a segment, applied to a force. Plane stress.
+[[nodiscard]] inline Vector2 yield_m(const reference::GridImage& whole, const contact::WorkingSet::Point& segment, double scale,
+                                     const Vector2& force_n) {
+  const double size = std::hypot(segment.heading[0], segment.heading[1]);
+  const Vector2 t{segment.heading[0] / size, segment.heading[1] / size};
+  const auto& [young_pa, poisson] = whole.image().tissue.material.front();
+  const double per_pa = scale / whole.image().tissue.thickness_m;
+  const double axial_m = per_pa * (t[0] * force_n[0] + t[1] * force_n[1]) * 2.0 * (1.0 + poisson) / young_pa;
+  const double lateral_m = per_pa * (t[0] * force_n[1] - t[1] * force_n[0]) * (1.0 - poisson * poisson) / young_pa;
+  return {t[0] * axial_m - t[1] * lateral_m, t[1] * axial_m + t[0] * lateral_m};
+}
+
+// What elements miss on a line load through them: a tent of height q |d| / (2 C t), interpolated, by its two components.
+[[nodiscard]] inline Vector2 ridge_m(const reference::GridImage& whole, const contact::WorkingSet::Point& segment, double length_m,
+                                     const Vector2& force_n) {
+  const double size = std::hypot(segment.heading[0], segment.heading[1]);
+  const Vector2 t{segment.heading[0] / size, segment.heading[1] / size};
+  double distance_m = 0.0;
+  for (std::uint32_t k = 0; k < segment.at.count; ++k) {
+    const fem::Point& node = whole.mesh().node[segment.at.node[k]];
+    distance_m += segment.at.weight[k] * std::abs(t[0] * (node[1] - segment.begin_m[1]) - t[1] * (node[0] - segment.begin_m[0]));
+  }
+  return yield_m(whole, segment, distance_m / (2.0 * length_m), force_n);
+}
+
+// Of segment i over the jumps of density to its neighbours, all of them whole and the spacing being the mesh's.
+[[nodiscard]] inline Vector2 jump_m(const reference::GridImage& whole, const contact::WorkingSet& set, std::size_t i) {
+  const auto course = [&](std::size_t k) { return std::hypot(set.point(k).heading[0], set.point(k).heading[1]); };
+  Vector2 sum{};
+  for (const std::size_t later : {i, i + 1}) {
+    if (later == 0 || later >= set.size()) continue;
+    const double share = course(later) / course(later - 1);
+    const Vector2& f = set.solver().contact(later).force_n;
+    const Vector2& g = set.solver().contact(later - 1).force_n;
+    const Vector2 u = yield_m(whole, set.point(later), 0.15, {f[0] - share * g[0], f[1] - share * g[1]});
+    const double sign = later == i ? 1.0 : -share;
+    sum = {sum[0] + sign * u[0], sum[1] + sign * u[1]};
+  }
+  return sum;
+}
 
 // The contact forces on the nodes of the whole sparse mesh (as adapted): the displacements that these cause say where the contacts
 // are, and with that what the base must apply.
@@ -116,19 +158,39 @@ struct Balance {
         load(static_cast<Eigen::Index>(2 * at.node[k] + c)) += at.weight[k] * set.solver().contact(i).force_n[c];
   }
   const Eigen::VectorXd u = whole.statics().solve(load);
+  const auto unit_load = [&](std::size_t i) {
+    const contact::Embedding& at = set.point(i).at;
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(whole.statics().degrees_of_freedom(), 2);
+    for (std::uint32_t k = 0; k < at.count; ++k)
+      for (Eigen::Index c = 0; c < 2; ++c) unit(2 * static_cast<Eigen::Index>(at.node[k]) + c, c) += at.weight[k];
+    return unit;
+  };
   Balance balance;
   Wrench sum;
   const Vector2 t = hand.axis();
   for (std::size_t i = 0; i < set.size(); ++i) {
     const contact::Embedding& at = set.point(i).at;
-    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(whole.statics().degrees_of_freedom(), 2);
-    for (std::uint32_t k = 0; k < at.count; ++k)
-      for (Eigen::Index c = 0; c < 2; ++c) unit(2 * static_cast<Eigen::Index>(at.node[k]) + c, c) += at.weight[k];
-    const Eigen::Matrix2d own = unit.transpose() * whole.statics().solve(unit);
-    const contact::Block tied = set.solver().compliance(i, i);
+    const Eigen::MatrixXd moved = whole.statics().solve(unit_load(i));
     const Vector2& f = set.solver().contact(i).force_n;
-    Vector2 x{(tied[0] - own(0, 0)) * f[0] + (tied[1] - own(0, 1)) * f[1], (tied[2] - own(1, 0)) * f[0] + (tied[3] - own(1, 1)) * f[1]};
-    if (i + 1 < set.size()) balance.stretch_m = std::max(balance.stretch_m, std::hypot(x[0], x[1]));
+    // What the tie gives way: its compliance beyond the mesh's, its own and with the contacts beside it.
+    Vector2 x{};
+    for (std::size_t j = i == 0 ? 0 : i - 1; j < std::min(i + 2, set.size()); ++j) {
+      const Eigen::Matrix2d raw = moved.transpose() * unit_load(j);
+      const contact::Block tied = set.solver().compliance(i, j);
+      const Vector2& g = set.solver().contact(j).force_n;
+      x = {x[0] + (tied[0] - raw(0, 0)) * g[0] + (tied[1] - raw(0, 1)) * g[1],
+           x[1] + (tied[2] - raw(1, 0)) * g[0] + (tied[3] - raw(1, 1)) * g[1]};
+    }
+    const bool embedded = hand.method() == contact::Method::Embedded;
+    if (i + (embedded ? 2 : 1) < set.size()) {
+      Vector2 expected{};
+      if (embedded) {
+        const Vector2 ridge = ridge_m(whole, set.point(i), set.point(i + 1).path_m - set.point(i).path_m, f);
+        const Vector2 jump = jump_m(whole, set, i);
+        expected = {ridge[0] + jump[0], ridge[1] + jump[1]};
+      }
+      balance.stretch_m = std::max(balance.stretch_m, std::hypot(x[0] - expected[0], x[1] - expected[1]));
+    }
     for (std::uint32_t k = 0; k < at.count; ++k)
       for (std::size_t c = 0; c < 2; ++c)
         x[c] += at.weight[k] * (whole.mesh().node[at.node[k]][c] + u(static_cast<Eigen::Index>(2 * at.node[k] + c)));

@@ -79,7 +79,7 @@ TEST_P(InsertionBy, ForcesBalanceOnTheWholeMesh) {
     const Balance balance = balance_of(moved ? *moved : grid(), hand);
     EXPECT_LT(balance.wrench, 1e-8);
     EXPECT_LT(balance.off_axis_m, 1e-10);
-    // A segment's tie is soft by a millionth of its own compliance, a node's by a millionth of that.
+    // Beyond its ridge a segment's tie is soft by a millionth of its own compliance, a node's by a millionth of that.
     EXPECT_LT(balance.stretch_m, embedded() ? 1e-7 : 1e-12);
     EXPECT_GT(hand.model().contacts(), 5u);
   };
