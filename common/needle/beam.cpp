@@ -420,6 +420,6 @@ Station Beam::at(double arclength_m) const noexcept {
   return station;
 }
 
-Wrench Beam::reaction() const noexcept { return {-clamp_n_[0], -clamp_n_[1], r_[0]}; }
+Wrench Beam::reaction() const noexcept { return {0.0 - clamp_n_[0], 0.0 - clamp_n_[1], r_[0]}; }
 
 }  // namespace trocar::needle
