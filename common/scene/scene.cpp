@@ -23,6 +23,20 @@ Scene read_scene(const std::filesystem::path& file) {
   return scene;
 }
 
+Needle read_needle(const std::filesystem::path& file) {
+  const config::Document document = config::Document::load(file);
+  const config::Table root = document.root();
+  if (root.has("tissue")) {
+    const Scene scene = read_scene(file);
+    if (scene.needle) return *scene.needle;
+    throw config::UserError(
+        fmt::format("{}: needle: missing; add the table [needle] with model = \"beam\", length_m and gauge", file.string()));
+  }
+  const Needle needle = needle_of(root.table("needle"));
+  document.refuse_unknown_keys();
+  return needle;
+}
+
 void require_rigid_insertion(const Scene& scene) {
   const std::string file = scene.file.string();
   if (!scene.needle) throw config::UserError(fmt::format("{}: needle: missing; add the table [needle] with model and length_m", file));

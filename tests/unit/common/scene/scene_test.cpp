@@ -297,6 +297,34 @@ TEST_F(SceneTest, RefusesNeedlesThatCannotBe) {
                {"needle.outer_m: missing", "gauge = \"22G\""});
 }
 
+TEST_F(SceneTest, ReadsWhatANeedleIsMadeOf) {
+  const auto with = [&](const std::string& keys) { return read_needle(write("[needle]\nmodel = \"beam\"\nlength_m = 0.15\n" + keys)); };
+  const Needle nitinol = with("gauge = \"20G\"\nmaterial = \"nitinol\"\ncurvature_per_m = -3.0\nbevel_deg = -30\nbevel_friction = 0.4\n");
+  EXPECT_EQ(nitinol.young_pa, 75e9);
+  EXPECT_EQ(nitinol.curvature_per_m, -3.0);
+  EXPECT_NEAR(nitinol.bevel.angle_rad, -0.52359877559829882, 1e-15);
+  EXPECT_EQ(nitinol.bevel.friction, 0.4);
+  EXPECT_NEAR(beam_of(nitinol).bending_nm2, 0.375 * 5.3754e-3, 1e-6);
+  EXPECT_EQ(with("outer_m = 0.001\ninner_m = 0.0\nmaterial = \"steel\"\nbevel = \"symmetric\"\n").young_pa, 200e9);
+  EXPECT_EQ(with("gauge = \"20G\"\nyoung_pa = 1e9\n").young_pa, 1e9);
+  // Of a whole scene the same.
+  EXPECT_EQ(read_needle(write(solid_text)).elements, 30);
+  const auto refuses = [&](const std::string& keys, std::initializer_list<std::string> parts) {
+    expect_parts(error_of("[needle]\nmodel = \"beam\"\nlength_m = 0.15\n" + keys, read_needle), parts);
+  };
+  refuses("gauge = \"20G\"\nmaterial = \"brass\"\n", {"file.toml:5: needle.material = \"brass\"", "steel", "nitinol"});
+  refuses("gauge = \"20G\"\nmaterial = \"steel\"\nyoung_pa = 1e9\n", {"needle.young_pa = 1", "remove either material or young_pa"});
+  refuses("outer_m = 0.001\ninner_m = 0.0\n", {"needle.young_pa: missing", "material"});
+  refuses("gauge = \"20G\"\nbevel_deg = 2\n", {"needle.bevel_deg = 2: flatter than 5 degrees"});
+  refuses("gauge = \"20G\"\nbevel = \"symmetric\"\nbevel_deg = 30\n", {"needle.bevel_deg = 30", "remove either"});
+  refuses("gauge = \"20G\"\nbevel_friction = 0.3\n", {"needle.bevel_friction = 0.3", "add bevel_deg"});
+  refuses("gauge = \"20G\"\ncurvature_per_m = 50.0\n", {"needle.curvature_per_m = 50"});
+  refuses("gauge = \"20G\"\nelements = 65\n", {"needle.elements = 65", "64"});
+  refuses("gauge = \"20G\"\nlenght = 65\n", {"needle.lenght", "unknown key"});
+  expect_parts(error_of("[needle]\nmodel = \"rigid\"\nlength_m = 0.1\n", [](const auto& file) { return beam_of(read_needle(file)); }),
+               {"file.toml:2: needle.model = \"rigid\"", "write \"beam\""});
+}
+
 TEST_F(SceneTest, RefusesWhatCannotBeComputed) {
   refused("poisson = 0.48", "poisson = 0.5", {"tissue.material.poisson = 0.5: must be from 0 to 0.4999"});
   refused("young_pa = 25300.0", "young_kpa = 25.3",
