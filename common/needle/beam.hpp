@@ -104,6 +104,9 @@ class Beam {
   // Starts at rest, theta' = kappa. NotOpen: length, EI and EA must be positive and finite, elements from 1 to capacity::needle_elements.
   Status open(const Properties& properties) noexcept;
   void reset() noexcept;  // back to rest
+  // Remembers the bend, and takes it again: the next place starts from it.
+  void keep() noexcept { kept_ = bend_; }
+  void restore() noexcept { bend_ = kept_; }
   [[nodiscard]] const Properties& properties() const noexcept { return properties_; }
 
   // Equilibrium from the present bend: theta relative to the base is kept from one call to the next. Least energy by Newton's method with a
@@ -207,6 +210,7 @@ class Beam {
   double residual_nm_{}, energy_j_{}, energy_noise_j_{};
   double overhang_geometric_nm_{};
   std::array<double, most_nodes> bend_{};  // theta relative to the base
+  std::array<double, most_nodes> kept_{};
   std::array<double, most_nodes> r_{};     // R
   // K row i: diagonal, with i - 1, with i - 2; then D and L in their place.
   std::array<double, most_nodes> diagonal_{}, first_{}, second_{};
