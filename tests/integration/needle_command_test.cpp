@@ -59,7 +59,7 @@ TEST(NeedleCommand, TakesASceneANameAndManyForces) {
     EXPECT_NE(scene.out().find(word), std::string::npos) << scene.out();
   Program name(scratch, "trocar", {"needle", "bend", "chiba_20g", "--out", out});
   ASSERT_EQ(name.wait(answer_s), 0) << name.errors();
-  EXPECT_EQ(rows_of(read_text(out)).back()[1], 0.15);
+  EXPECT_NEAR(rows_of(read_text(out)).back()[1], 0.15, 1e-15);
   Program help(scratch, "trocar", {"needle", "bend", "--help"});
   ASSERT_EQ(help.wait(answer_s), 0);
   EXPECT_NE(help.out().find("Example: trocar needle bend"), std::string::npos);
