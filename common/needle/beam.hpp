@@ -211,7 +211,7 @@ class Beam {
   double overhang_geometric_nm_{};
   std::array<double, most_nodes> bend_{};  // theta relative to the base
   std::array<double, most_nodes> kept_{};
-  std::array<double, most_nodes> r_{};     // R
+  std::array<double, most_nodes> r_{};  // R
   // K row i: diagonal, with i - 1, with i - 2; then D and L in their place.
   std::array<double, most_nodes> diagonal_{}, first_{}, second_{};
   std::array<double, 2> clamped_{};  // K of nodes 1 and 2 with node 0

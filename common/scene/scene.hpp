@@ -81,8 +81,8 @@ struct Scene {
 // Throws config::UserError unless the needle's model is "beam".
 [[nodiscard]] needle::Properties beam_of(const Needle& needle);
 
-// For commands that insert: throws config::UserError for a scene without needle or contact, or with a needle that is not rigid.
-void require_rigid_insertion(const Scene& scene);
+// For commands that insert: throws config::UserError for a scene without needle or contact, or with the offline model of the thesis.
+void require_insertion(const Scene& scene);
 
 // Where a needle enters a grid: the middle of its side y_min, {x_m, y_m}. Throws config::UserError for a tissue that comes from a file.
 [[nodiscard]] std::array<double, 2> entry_m(const Scene& scene);

@@ -96,7 +96,7 @@ TEST_F(SceneTest, FillsEveryMemberFromTheFile) {
   EXPECT_FALSE(scene.corridor.has_value());
   EXPECT_EQ(scene.visible, fem::Where(fem::Box{}));
   EXPECT_FALSE(scene.single_precision);
-  EXPECT_NO_THROW(require_rigid_insertion(scene));
+  EXPECT_NO_THROW(require_insertion(scene));
   EXPECT_NEAR(entry_m(scene)[0], 0.0, 1e-15);
   EXPECT_EQ(entry_m(scene)[1], 0.15);
 }
@@ -157,7 +157,7 @@ TEST_F(SceneTest, ReadsASolidWithEverything) {
   EXPECT_EQ(scene.plane_z_m, 0.006);
   EXPECT_EQ(scene.visible, fem::Where(fem::Side::XMax));
   EXPECT_TRUE(scene.single_precision);
-  expect_parts(error_from([&] { require_rigid_insertion(scene); }), {"file.toml:14: needle.model", "not available yet"});
+  expect_parts(error_from([&] { require_insertion(scene); }), {"file.toml:14: needle.model", "not available yet"});
 }
 
 TEST_F(SceneTest, NeedsNeitherNeedleNorContact) {
@@ -165,7 +165,7 @@ TEST_F(SceneTest, NeedsNeitherNeedleNorContact) {
   const Scene scene = read_scene(write(text));
   EXPECT_FALSE(scene.needle.has_value());
   EXPECT_FALSE(scene.contact.has_value());
-  expect_parts(error_from([&] { require_rigid_insertion(scene); }), {"file.toml: needle: missing"});
+  expect_parts(error_from([&] { require_insertion(scene); }), {"file.toml: needle: missing"});
   const Scene needle =
       read_scene(write(text + "[needle]\nmodel = \"thesis\"\nlength_m = 0.15\nouter_m = 0.0009\ninner_m = 0.0006\nyoung_pa = 2e11\n"));
   EXPECT_EQ(needle.needle->model, NeedleModel::Thesis);
