@@ -89,8 +89,8 @@ std::size_t factor_estimate(double unknowns, int dimension) {
 void check_method(const scene::Scene& scene, bool solid) {
   if (!scene.needle || !scene.contact)
     throw fem::Error("no [needle] or no [contact]: an image needs both; write them as in host/share/scenes");
-  if (scene.needle->model != scene::NeedleModel::Rigid)
-    throw fem::Error("needle.model: images hold rigid needles only, others are not available yet; write model = \"rigid\"");
+  if (scene.needle->model == scene::NeedleModel::Thesis)
+    throw fem::Error("needle.model = \"thesis\" is computed offline alone; write model = \"beam\" or \"rigid\"");
   if (scene.contact->method == contact::Method::Subdivide)
     throw fem::Error(
         "contact.method = \"subdivide\" changes the unknowns, which an image cannot; write \"embedded\", \"snap\" or \"adapt\"");
@@ -157,7 +157,14 @@ Plan plan_checked(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_vi
   check_method(scene, mesh.dimension() == 3);
   Candidates candidates = candidates_of(mesh, scene);
   Plan result{.mesh = std::move(mesh), .candidates = std::move(candidates)};
-  result.needle = {scene.needle->length_m, 0.5 * scene.needle->outer_m.value_or(0.0)};
+  result.needle = {.length_m = scene.needle->length_m, .radius_m = 0.5 * scene.needle->outer_m.value_or(0.0)};
+  if (scene.needle->model == scene::NeedleModel::Beam) {
+    const needle::Properties beam = scene::beam_of(*scene.needle);
+    result.needle.elements = beam.elements;
+    result.needle.bending_nm2 = beam.bending_nm2;
+    result.needle.axial_n = beam.axial_n;
+    result.needle.curvature_per_m = beam.curvature_per_m;
+  }
   result.single_precision = scene.single_precision;
   if (with_visible == WithVisible::Yes) result.visible = visible_of(result.mesh, scene.visible);
   plan_contacts(scene, result);

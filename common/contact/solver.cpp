@@ -111,14 +111,25 @@ void Solver::set_state(std::size_t i, State state) noexcept {
 
 void Solver::start_from(std::size_t i, State state) noexcept { set_state(i, state); }
 
-void Solver::push(std::span<const Block> row) noexcept {
+void Solver::push(std::span<const Block> row) noexcept { push(row, Contact{}); }
+
+void Solver::push(std::span<const Block> row, const Contact& start) noexcept {
   const std::size_t i = size_++;
   set_row(i, row);
-  contact_[i] = {};
+  contact_[i] = start;
   tangent_x_[i] = 1.0;
   tangent_y_[i] = 0.0;
   put_force(i);
   enter(i);
+}
+
+void Solver::assume(std::span<const Contact> contact) noexcept {
+  for (std::size_t i = 0; i < size_; ++i) {
+    set_state(i, contact[i].state);
+    contact_[i] = contact[i];
+    put_force(i);
+  }
+  evaluate();
 }
 
 void Solver::replace(std::size_t i, std::span<const Block> row) noexcept {

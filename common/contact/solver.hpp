@@ -76,6 +76,10 @@ class Solver {
   // `row[j]` couples the new contact with contact j < size(), row[size()] is its own block (any regularisation already in it).
   // It starts force-free and slipping forward. Precondition: size() < capacity.
   void push(std::span<const Block> row) noexcept;
+  // The same, from a force (its parts hold in whatever frame comes next while it slips) and a state.
+  void push(std::span<const Block> row, const Contact& start) noexcept;
+  // Takes force, state and slip from elsewhere: u = G f follows at once.
+  void assume(std::span<const Contact> contact) noexcept;
   // The compliance of contact i changed: blocks with contacts 0 … i. Forces and states stay.
   void replace(std::size_t i, std::span<const Block> row) noexcept;
   void replace_own(std::size_t i, const Block& own) noexcept;

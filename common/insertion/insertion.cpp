@@ -49,6 +49,8 @@ const char* to_string(Status status) noexcept {
       return "the residual stays above its tolerance";
     case Status::PivotLimit:
       return "the bound on pivots was hit";
+    case Status::NotConverged:
+      return "the bending needle found no equilibrium and was carried on rigidly";
     case Status::OffShaft:
       return "an explicit contact does not lie on the shaft";
     case Status::NotFinite:
@@ -61,11 +63,14 @@ void Insertion::open(const model::Image& image) noexcept {
   image_ = &image;
   set_.open(image.tissue, *image.law);
   density_.open(*image.law);
+  bends_ = image.needle.elements > 0;
+  if (bends_) flexible_.open(image.needle);
   reset();
 }
 
 void Insertion::reset() noexcept {
   set_.clear();
+  if (bends_) flexible_.reset();
   started_ = false;
   speed_m_s_ = 0.0;
   shaft_n_per_m_ = density_.shaft_n_per_m(0.0);
@@ -96,7 +101,9 @@ void Insertion::anchor_fresh() noexcept {
     p.fresh = false;
     // The tie's own softness counts as displacement, as it does in the solve.
     const Vector2 u = set_.tied_displacement_m(i);
-    p.arclength_m = dot(axis_, {p.material_m[0] + u[0] - pose_.x_m, p.material_m[1] + u[1] - pose_.y_m});
+    const Vector2 x{p.material_m[0] + u[0], p.material_m[1] + u[1]};
+    p.arclength_m = dot(axis_, {x[0] - pose_.x_m, x[1] - pose_.y_m});
+    if (bends_) p.arclength_m = flexible_.arclength_m(x, p.arclength_m);
   }
 }
 
@@ -131,7 +138,7 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   Result result;
   // What the last solve did to the path. Done here, so that between two steps the contacts are those that carried the last result.
   if (law.explicit_count == 0 && set_.size() > 0) {
-    result.status = status_of(set_.follow({result_.tip.x_m, result_.tip.y_m}, axis_));
+    result.status = status_of(set_.follow({tip_.x_m, tip_.y_m}, tip_axis_));
     anchor_fresh();
   }
   if (base.theta_rad != pose_.theta_rad || !started_) axis_ = {std::cos(base.theta_rad), std::sin(base.theta_rad)};
@@ -145,9 +152,8 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   }
   const bool first = !started_;
   pose_ = base;
-  const double needle_m = image_->needle.length_m;
-  const Vector2 tip{base.x_m + needle_m * axis_[0], base.y_m + needle_m * axis_[1]};
-  result.tip = {tip[0], tip[1], base.theta_rad};
+  if (bends_ && set_.size() == 0 && !flexible_.free(base)) result.status = worst(result.status, Status::NotConverged);
+  if (!bends_ || set_.size() == 0) take_tip();
 
   if (law.explicit_count > 0) {
     if (first && !place_explicit()) {
@@ -156,36 +162,67 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
     }
     anchor_fresh();
   } else if (set_.size() == 0) {
+    const Vector2 tip{tip_.x_m, tip_.y_m};
     if (set_.in_tissue(tip)) {
-      result.status = worst(result.status, status_of(set_.enter(tip, axis_, needle_m)));
+      result.status = worst(result.status, status_of(set_.enter(tip, tip_axis_, image_->needle.length_m)));
       anchor_fresh();
     }
   }
   started_ = true;
 
-  const std::size_t n = set_.size();
-  if (n > 0) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const contact::WorkingSet::Point& p = set_.point(i);
-      target_[i].tangent = axis_;
-      target_[i].gap_m = {base.x_m + p.arclength_m * axis_[0] - p.material_m[0], base.y_m + p.arclength_m * axis_[1] - p.material_m[1]};
-    }
-    set_.soften_last(axis_);
-    set_.set_bounds(shaft_n_per_m_, tip_n_per_m_, {target_.data(), n});
-    if (!skip_) set_.solver().forget_factor();
-    const contact::Solution solution = set_.solver().solve({target_.data(), n});
-    result.status = worst(result.status, status_of(solution.status));
-    result.pivots = solution.pivots;
-    result.iterations = solution.iterations;
-    result.rows_factored = solution.rows_factored;
-    result.residual_n = solution.residual_n;
+  if (set_.size() > 0) {
+    set_.soften_last(tip_axis_);
+    set_.set_bounds(shaft_n_per_m_, tip_n_per_m_, {target_.data(), set_.size()});
+    if (bends_)
+      solve_bending(result);
+    else
+      solve_rigid(result);
     result.base = base_wrench();
-    for (std::size_t i = 0; i < n; ++i)
-      if (set_.solver().contact(i).state != contact::State::Stuck) set_.point(i).arclength_m -= set_.solver().contact(i).slip_m;
   }
+  result.tip = tip_;
   result.contacts = static_cast<std::uint32_t>(set_.size());
   result.path_m = set_.path_m();
   return result_ = result;
+}
+
+void Insertion::take_tip() noexcept {
+  if (bends_) {
+    const needle::Station tip = flexible_.beam().tip();
+    tip_ = {tip.position_m[0], tip.position_m[1], tip.theta_rad};
+    tip_axis_ = tip.tangent;
+  } else {
+    const double needle_m = image_->needle.length_m;
+    tip_ = {pose_.x_m + needle_m * axis_[0], pose_.y_m + needle_m * axis_[1], pose_.theta_rad};
+    tip_axis_ = axis_;
+  }
+}
+
+void Insertion::solve_rigid(Result& result) noexcept {
+  const std::size_t n = set_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const contact::WorkingSet::Point& p = set_.point(i);
+    target_[i].tangent = axis_;
+    target_[i].gap_m = {pose_.x_m + p.arclength_m * axis_[0] - p.material_m[0], pose_.y_m + p.arclength_m * axis_[1] - p.material_m[1]};
+  }
+  if (!skip_) set_.solver().forget_factor();
+  const contact::Solution solution = set_.solver().solve({target_.data(), n});
+  result.status = worst(result.status, status_of(solution.status));
+  result.pivots = solution.pivots;
+  result.iterations = solution.iterations;
+  result.rows_factored = solution.rows_factored;
+  result.residual_n = solution.residual_n;
+  for (std::size_t i = 0; i < n; ++i)
+    if (set_.solver().contact(i).state != contact::State::Stuck) set_.point(i).arclength_m -= set_.solver().contact(i).slip_m;
+}
+
+void Insertion::solve_bending(Result& result) noexcept {
+  const Flexible::Outcome outcome = flexible_.solve(pose_, set_, {target_.data(), set_.size()});
+  result.status = worst(result.status, outcome.converged ? status_of(outcome.contacts) : Status::NotConverged);
+  result.pivots = outcome.pivots;
+  result.iterations = outcome.solves;
+  result.newton = outcome.iterations;
+  result.residual_n = outcome.residual_n;
+  take_tip();
 }
 
 }  // namespace trocar::insertion

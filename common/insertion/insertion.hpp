@@ -1,12 +1,13 @@
-// The step of a rigid needle: base pose in, base wrench out. Tissue and contacts are solved in one go, to a residual.
+// The step: base pose in, base wrench out. Tissue, contacts and a needle that bends are solved in one go, to a residual.
 //
 //   Pose of the base in the rig frame, theta from base to tip; t = (cos theta, sin theta). Contact i: material point X_i, displacement u_i,
 //   anchored at arclength s_i. Its target is d_i = b + s_i t - X_i; contact/solver.hpp solves for the forces f_i of the needle on the
 //   tissue; a contact that slipped is anchored anew: s_i <- s_i - ds_i. Then the tip is followed (contact/working_set.hpp). base wrench =
 //   what the base applies to the needle = sum f_i, sum (X_i + u_i - b) x f_i: right-handed about the base point (MODELS 8).
-// Skips, none of which changes a result: needle outside of the tissue, no contact solve; no state, frame or geometry changed, the
-// factor is used again (solver.hpp); nothing changed at all, the last forces stay.
-// One step is a pure function of (state, pose, dt): no allocation, lock, system call, exception; bounded time whatever the mesh.
+// A needle that bends: flexible.hpp; the tip goes where the bent shaft points.
+// Skips, none of which changes a result: needle outside of the tissue, no contact solve; rigid needle, no beam; no state, frame or geometry
+// changed, the factor is used again (solver.hpp); nothing changed at all, the last forces stay. One step is a pure function of (state,
+// pose, dt): no allocation, lock, system call, exception; bounded time whatever the mesh.
 #pragma once
 
 #include <array>
@@ -16,23 +17,15 @@
 #include "common/contact/density.hpp"
 #include "common/contact/working_set.hpp"
 #include "common/core/capacities.hpp"
+#include "common/insertion/flexible.hpp"
 #include "common/model/image.hpp"
 
 namespace trocar::insertion {
 
 using contact::Vector2;
 
-struct Pose {
-  double x_m{};
-  double y_m{};
-  double theta_rad{};
-};
-
-struct Wrench {  // what the base applies to the needle
-  double fx_n{};
-  double fy_n{};
-  double tau_nm{};  // about the base point
-};
+using needle::Pose;
+using needle::Wrench;
 
 // In order of severity: a step reports the first that applies.
 enum class Status : std::uint8_t {
@@ -43,6 +36,7 @@ enum class Status : std::uint8_t {
   TipLost,          // the tip's material point was not found: tissue torn out of all proportion by a jump of the base
   IllConditioned,   // the residual stays above the tolerance
   PivotLimit,       // the bound on pivots was hit; forces within their bounds
+  NotConverged,     // a needle that bends found no equilibrium: bend and forces are the last ones, carried on rigidly
   OffShaft,         // an explicit contact does not lie on the shaft at the first step: nothing is computed
   NotFinite,        // pose or time step refused; the last result stays
 };
@@ -54,7 +48,8 @@ struct Result {
   Pose tip{};
   std::uint32_t contacts{};
   std::int32_t pivots{};
-  std::int32_t iterations{};
+  std::int32_t iterations{};  // solves of the contacts
+  std::int32_t newton{};      // iterations of a needle that bends
   std::int32_t rows_factored{};
   double residual_n{};
   double path_m{};  // length of the path in the tissue, entry to tip
@@ -84,6 +79,9 @@ class Insertion {
   [[nodiscard]] ContactReport contact(std::size_t i) const noexcept;
   [[nodiscard]] const contact::WorkingSet& working_set() const noexcept { return set_; }
   [[nodiscard]] contact::WorkingSet& working_set() noexcept { return set_; }
+  // Bent shape after a step; meaningless for a rigid needle.
+  [[nodiscard]] const needle::Beam& beam() const noexcept { return flexible_.beam(); }
+  [[nodiscard]] bool bends() const noexcept { return bends_; }
   [[nodiscard]] double speed_m_s() const noexcept { return speed_m_s_; }  // along the shaft, filtered
   [[nodiscard]] double shaft_n_per_m() const noexcept { return shaft_n_per_m_; }
 
@@ -93,10 +91,17 @@ class Insertion {
  private:
   bool place_explicit() noexcept;
   void anchor_fresh() noexcept;
+  void take_tip() noexcept;
+  void solve_rigid(Result& result) noexcept;
+  void solve_bending(Result& result) noexcept;
   [[nodiscard]] Wrench base_wrench() const noexcept;
 
   const model::Image* image_{nullptr};
   contact::WorkingSet set_{};
+  Flexible flexible_{};
+  bool bends_{false};
+  Pose tip_{};  // of the shaft as it stands
+  Vector2 tip_axis_{1.0, 0.0};
   contact::Density density_{};
   std::array<contact::Target, capacity::contacts> target_{};
   bool skip_{true};

@@ -21,8 +21,12 @@ inline constexpr std::size_t max_nodes = 1U << 20U;         // candidates; far b
 inline constexpr double explicit_point_tolerance_m = 1e-9;  // how far outside of a cell an explicit contact may lie
 
 struct Needle {
-  double length_m{};  // from base to tip, straight and rigid
-  double radius_m{};  // outer; 0 when the scene gives none (planar scenes need none)
+  double length_m{};         // from base to tip
+  double radius_m{};         // outer; 0 when the scene gives none (planar scenes need none)
+  std::uint64_t elements{};  // of the beam; 0 for a rigid needle, and then what follows is 0 too
+  double bending_nm2{};      // EI
+  double axial_n{};          // EA
+  double curvature_per_m{};  // of the unloaded needle
 };
 
 // What a scene takes of common/core/capacities.hpp.

@@ -230,6 +230,10 @@ ImageStatus verify(const Image& image) noexcept {
   const Tissue& t = image.tissue;
   if (!tissue_ok(t)) return ImageStatus::BadTissue;
   if (!positive(image.needle.length_m) || !not_negative(image.needle.radius_m)) return ImageStatus::BadNeedle;
+  const Needle& needle = image.needle;
+  if (needle.elements > capacity::needle_elements || !std::isfinite(needle.curvature_per_m) ||
+      (needle.elements > 0 && !(positive(needle.bending_nm2) && positive(needle.axial_n))))
+    return ImageStatus::BadNeedle;
   const Need& need = image.need;
   if (t.node_m.size() > max_nodes || need.contacts > capacity::contacts || need.cells_per_bucket > capacity::cells_per_bucket ||
       need.ring_cells > capacity::ring_cells) {

@@ -1,27 +1,45 @@
 #include <fmt/format.h>
 
-#include <array>
+#include <cmath>
+#include <numbers>
 #include <string>
 
+#include "common/config/user_error.hpp"
+#include "common/core/capacities.hpp"
+#include "common/needle/tube.hpp"
 #include "common/scene/sections.hpp"
 
 namespace trocar::scene {
 namespace {
 
-struct Gauge {
-  const char* name;
-  double outer_m;
-  double inner_m;
-};
+constexpr auto most_beam_elements = static_cast<std::int64_t>(capacity::needle_elements);
+constexpr config::Range modulus{1e6, 1e12};
+constexpr const char* modulus_remedy = "of the needle, or write material = \"steel\"";
 
-// Nominal diameters of steel tubes with a regular wall, as dealers of needles list them.
-constexpr std::array gauges{Gauge{"14G", 2.108e-3, 1.600e-3}, Gauge{"15G", 1.829e-3, 1.372e-3}, Gauge{"16G", 1.651e-3, 1.194e-3},
-                            Gauge{"17G", 1.473e-3, 1.067e-3}, Gauge{"18G", 1.270e-3, 0.838e-3}, Gauge{"19G", 1.067e-3, 0.686e-3},
-                            Gauge{"20G", 0.908e-3, 0.603e-3}, Gauge{"21G", 0.819e-3, 0.514e-3}, Gauge{"22G", 0.718e-3, 0.413e-3},
-                            Gauge{"23G", 0.641e-3, 0.337e-3}, Gauge{"24G", 0.565e-3, 0.311e-3}, Gauge{"25G", 0.514e-3, 0.260e-3},
-                            Gauge{"26G", 0.464e-3, 0.260e-3}, Gauge{"27G", 0.413e-3, 0.210e-3}, Gauge{"28G", 0.362e-3, 0.184e-3},
-                            Gauge{"29G", 0.337e-3, 0.184e-3}, Gauge{"30G", 0.312e-3, 0.159e-3}};
-constexpr double steel_young_pa = 200e9;
+double young_pa(const config::Table& table) {
+  if (!table.has("material")) return table.number("young_pa", modulus, modulus_remedy);
+  if (table.has("young_pa")) table.fail("young_pa", "the material says the modulus already; remove either material or young_pa");
+  return needle::find_material(table.one_of("material", {"steel", "nitinol"}))->young_pa;
+}
+
+needle::Bevel bevel_of(const config::Table& table) {
+  needle::Bevel bevel;
+  const bool angled = table.has("bevel_deg");
+  if (table.has("bevel")) {
+    (void)table.one_of("bevel", {"symmetric"});
+    if (angled) table.fail("bevel_deg", "a symmetric tip has no such angle; remove either bevel or bevel_deg");
+  }
+  if (!angled) {
+    if (table.has("bevel_friction")) table.fail("bevel_friction", "only a face at bevel_deg has it; add bevel_deg or remove this");
+    return bevel;
+  }
+  const double degrees =
+      table.number("bevel_deg", {-90.0, 90.0}, "between face and shaft, such as 30; negative with the point on the right");
+  if (std::abs(degrees) < 5.0) table.fail("bevel_deg", "flatter than 5 degrees either way; write bevel = \"symmetric\" for a tip without");
+  bevel.angle_rad = degrees * std::numbers::pi / 180.0;
+  bevel.friction = table.number_or("bevel_friction", 0.0, {0.0, 5.0}, "of tissue on the face, such as 0.3");
+  return bevel;
+}
 
 }  // namespace
 
@@ -31,21 +49,27 @@ Needle needle_of(const config::Table& table) {
   needle.model = model == "rigid" ? NeedleModel::Rigid : model == "beam" ? NeedleModel::Beam : NeedleModel::Thesis;
   needle.where = table.where("model");
   needle.length_m = table.number("length_m", {0.005, 1.0}, "from base to tip, such as 0.1");
-  needle.elements = static_cast<int>(table.integer_or("elements", needle.elements, 1, 1000, "along the needle, such as 24"));
+  const bool beam = needle.model == NeedleModel::Beam;
+  needle.elements =
+      static_cast<int>(table.integer_or("elements", needle.elements, 1, beam ? most_beam_elements : 1000,
+                                        beam ? "along the needle, such as 24 (capacity needle_elements)" : "along the needle, such as 24"));
+  // A needle bent to a whole turn would meet itself.
+  const double most_curvature = 2.0 * std::numbers::pi / needle.length_m;
+  needle.curvature_per_m = table.number_or("curvature_per_m", 0.0, {-most_curvature, most_curvature}, "1 over the radius, such as 5.0");
+  needle.bevel = bevel_of(table);
 
   if (table.has("gauge")) {
     for (const char* other : {"outer_m", "inner_m"})
       if (table.has(other)) table.fail(other, "the gauge says the diameters already; remove either gauge or outer_m and inner_m");
     const std::string name = table.text("gauge", "such as \"22G\"");
-    for (const Gauge& gauge : gauges)
-      if (name == gauge.name) {
-        needle.outer_m = gauge.outer_m;
-        needle.inner_m = gauge.inner_m;
-      }
-    if (!needle.outer_m)
+    const needle::Gauge* const gauge = needle::find_gauge(name);
+    if (gauge == nullptr)
       table.fail("gauge", fmt::format("not in the table; write one from \"{}\" to \"{}\", or outer_m, inner_m and young_pa",
-                                      gauges.front().name, gauges.back().name));
-    needle.young_pa = table.number_or("young_pa", steel_young_pa, {1e6, 1e12}, "of the needle, steel has 200e9");
+                                      needle::gauges().front().name, needle::gauges().back().name));
+    needle.outer_m = gauge->outer_m;
+    needle.inner_m = gauge->inner_m;
+    const bool stated = table.has("material") || table.has("young_pa");
+    needle.young_pa = stated ? young_pa(table) : needle::find_material("steel")->young_pa;
     return needle;
   }
   const bool bends = needle.model != NeedleModel::Rigid;
@@ -57,8 +81,18 @@ Needle needle_of(const config::Table& table) {
     if (*needle.inner_m >= *needle.outer_m)
       table.fail("inner_m", fmt::format("not smaller than outer_m = {}; exchange them", *needle.outer_m));
   }
-  if (bends || table.has("young_pa")) needle.young_pa = table.number("young_pa", {1e6, 1e12}, "of the needle, steel has 200e9");
+  if (bends || table.has("young_pa") || table.has("material")) needle.young_pa = young_pa(table);
   return needle;
+}
+
+needle::Properties beam_of(const Needle& needle) {
+  if (needle.model != NeedleModel::Beam)
+    throw config::UserError(
+        fmt::format("{}: needle.model = \"{}\": does not bend here; write \"beam\", with gauge or outer_m, inner_m and "
+                    "young_pa",
+                    needle.where, needle.model == NeedleModel::Rigid ? "rigid" : "thesis"));
+  const needle::Section section = needle::section_of(*needle.outer_m, *needle.inner_m, *needle.young_pa);
+  return {needle.length_m, section.bending_nm2, section.axial_n, needle.curvature_per_m, static_cast<std::size_t>(needle.elements)};
 }
 
 }  // namespace trocar::scene

@@ -23,12 +23,26 @@ Scene read_scene(const std::filesystem::path& file) {
   return scene;
 }
 
-void require_rigid_insertion(const Scene& scene) {
+Needle read_needle(const std::filesystem::path& file) {
+  const config::Document document = config::Document::load(file);
+  const config::Table root = document.root();
+  if (root.has("tissue")) {
+    const Scene scene = read_scene(file);
+    if (scene.needle) return *scene.needle;
+    throw config::UserError(
+        fmt::format("{}: needle: missing; add the table [needle] with model = \"beam\", length_m and gauge", file.string()));
+  }
+  const Needle needle = needle_of(root.table("needle"));
+  document.refuse_unknown_keys();
+  return needle;
+}
+
+void require_insertion(const Scene& scene) {
   const std::string file = scene.file.string();
   if (!scene.needle) throw config::UserError(fmt::format("{}: needle: missing; add the table [needle] with model and length_m", file));
-  if (scene.needle->model != NeedleModel::Rigid)
+  if (scene.needle->model == NeedleModel::Thesis)
     throw config::UserError(
-        fmt::format("{}: needle.model: a needle that bends is not available yet for insertion; write \"rigid\"", scene.needle->where));
+        fmt::format("{}: needle.model = \"thesis\": computed offline alone; write \"beam\" or \"rigid\"", scene.needle->where));
   if (!scene.contact)
     throw config::UserError(
         fmt::format("{}: contact: missing; add the table [contact] with shaft_n_per_m, tip_n_per_m and tip_zone_m", file));

@@ -14,8 +14,10 @@
 //   [[tissue.material]] young_pa, poisson, (box = [[x0, y0(, z0)], [x1, y1(, z1)]]), (region = "name")
 //     later entries override earlier ones
 //   [[tissue.support]] where = "x_min" … "z_max" | "group", or box; fix = ["x", "y", "z"]
-//   [needle] model = "rigid" | "beam" | "thesis", length_m, gauge = "22G" or outer_m, inner_m, young_pa (a rigid one needs none),
-//     (elements)
+//   [needle] model = "rigid" | "beam" | "thesis", length_m, gauge = "22G" or outer_m, inner_m (a rigid one needs none),
+//     (material = "steel" | "nitinol" or young_pa; steel with a gauge, required without), (elements), (curvature_per_m: of the unloaded
+//     needle, counter-clockwise), (bevel = "symmetric", or bevel_deg: angle between face and shaft, positive with the point on the left;
+//     with it bevel_friction), common/needle/tube.hpp and bevel.hpp say more
 //   [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m,
 //     (velocity_law = "none" or a name below),
 //     (spacing_m: of embedded contacts, an edge unless stated, 1.5 in a solid),
@@ -33,6 +35,8 @@
 
 #include "common/fem/tissue.hpp"
 #include "common/model/law.hpp"
+#include "common/needle/beam.hpp"
+#include "common/needle/bevel.hpp"
 
 namespace trocar::scene {
 
@@ -43,6 +47,8 @@ struct Needle {
   double length_m{};                                       // from base to tip
   std::optional<double> outer_m{}, inner_m{}, young_pa{};  // diameters of the tube; a rigid needle may have none
   int elements{24};
+  double curvature_per_m{};
+  needle::Bevel bevel{};
   std::string where{};  // FILE:LINE of the model, for those who cannot compute it
 };
 
@@ -69,8 +75,14 @@ struct Scene {
 // nothing are found by common/fem.
 [[nodiscard]] Scene read_scene(const std::filesystem::path& file);
 
-// For commands that insert: throws config::UserError for a scene without needle or contact, or with a needle that is not rigid.
-void require_rigid_insertion(const Scene& scene);
+// The table [needle] of a scene file, or of a file that has no other. Throws config::UserError.
+[[nodiscard]] Needle read_needle(const std::filesystem::path& file);
+
+// Throws config::UserError unless the needle's model is "beam".
+[[nodiscard]] needle::Properties beam_of(const Needle& needle);
+
+// For commands that insert: throws config::UserError for a scene without needle or contact, or with the offline model of the thesis.
+void require_insertion(const Scene& scene);
 
 // Where a needle enters a grid: the middle of its side y_min, {x_m, y_m}. Throws config::UserError for a tissue that comes from a file.
 [[nodiscard]] std::array<double, 2> entry_m(const Scene& scene);

@@ -217,7 +217,7 @@ class Lines {
 
 int run_insert(const InsertOptions& options) {
   scene::Scene scene = scene::read_scene(options.scene);
-  scene::require_rigid_insertion(scene);
+  scene::require_insertion(scene);
   if (!options.method.empty()) scene.contact->method = method_of(options.method);
   const std::vector<Row> path = read_path(options.path);
   Lines rows(options.out,

@@ -15,6 +15,7 @@
 #include "host/capture/recorder.hpp"
 #include "host/cli/demo.hpp"
 #include "host/cli/insert_command.hpp"
+#include "host/cli/needle_command.hpp"
 #include "host/cli/rig_commands.hpp"
 #include "host/cli/scene_commands.hpp"
 #include "host/solve/solve.hpp"
@@ -168,6 +169,33 @@ int main(int argc, char** argv) {
   insert_command->callback([&] {
     insert.scene = config::find_share("scenes", insert.scene.string());
     code = cli::run_insert(insert);
+  });
+
+  auto* needle_command = app.add_subcommand("needle", "needles by themselves");
+  needle_command->require_subcommand(1);
+  auto* bend_command = needle_command->add_subcommand(
+      "bend",
+      "the shape of a needle that bends under forces that keep their direction; base clamped at the origin, along +x\n"
+      "Example: trocar needle bend chiba_20g --tip-force 0,0.2 --at 0.07,0,-0.1 --out shape.csv\n"
+      "Result: s_m,x_m,y_m,theta_rad, s along the unloaded needle, a row for each node and mid-node of the elements.");
+  cli::NeedleBendOptions bend;
+  const auto numbers = [](std::size_t count, const char* pattern) {
+    return CLI::Validator([count, pattern](std::string& text) { return cli::wrong_numbers(text, count, pattern); }, pattern);
+  };
+  bend_command
+      ->add_option("needle", bend.needle,
+                   "needle name, or path of a TOML file that holds the table [needle] alone, or of a whole scene; model = \"beam\"")
+      ->required();
+  bend_command->add_option("--tip-force", bend.tip_force, "force on the tip, N")->check(numbers(2, "FX,FY"));
+  bend_command->add_option("--tip-moment", bend.tip_moment_nm, "moment on the tip, N m, counter-clockwise")->check(CLI::Range(-1e6, 1e6));
+  bend_command->add_option("--at", bend.at, "force at S m from the base, N; may be given again")
+      ->check(numbers(3, "S,FX,FY"))
+      ->allow_extra_args(false);
+  bend_command->add_option("--out", bend.out, "CSV of the shape, written anew")->required();
+  bend_command->add_flag("--json", bend.json, "the summary as JSON on stdout");
+  bend_command->callback([&] {
+    bend.needle = config::find_share("needles", bend.needle.string());
+    code = cli::needle_bend(bend);
   });
 
   auto* rig_command = app.add_subcommand("rig", "look at a rig, home, arm, hold and stop it");

@@ -33,7 +33,7 @@ ExperimentSetup read_setup(const std::string& name, const std::vector<double>& s
   s.rig = config::read_twin(s.rig_file);
   s.scene_file = config::find_share("scenes", s.experiment.scene);
   const scene::Scene scene = scene::read_scene(s.scene_file);
-  scene::require_rigid_insertion(scene);
+  scene::require_insertion(scene);
   const auto entry = scene::entry_m(scene);
   s.placement = {entry[1], entry[0], scene.needle->length_m};
   for (std::size_t i = 0; i < s.rig.gain_sets; ++i)

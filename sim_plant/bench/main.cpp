@@ -49,7 +49,7 @@ int run(const Options& options) {
   }
   const rig::Rig rig = config::read_twin(config::find_share("rigs", e.rig));
   const scene::Scene scene = scene::read_scene(config::find_share("scenes", e.scene));
-  scene::require_rigid_insertion(scene);
+  scene::require_insertion(scene);
   const auto entry = scene::entry_m(scene);
   const experiment::Placement placement{entry[1], entry[0], scene.needle->length_m};
   experiment::Sequencer sequencer(e, placement, rig, session);

@@ -8,7 +8,7 @@
 namespace trocar::sim_plant {
 
 Phantom::Phantom(const scene::Scene& scene) : insertion_(std::make_unique<insertion::Insertion>()) {
-  scene::require_rigid_insertion(scene);
+  scene::require_insertion(scene);
   condense::Options options;
   options.visible = condense::WithVisible::No;
   bytes_ = condense::compile_to_memory(scene, options).image;

@@ -96,7 +96,7 @@ TEST_F(SceneTest, FillsEveryMemberFromTheFile) {
   EXPECT_FALSE(scene.corridor.has_value());
   EXPECT_EQ(scene.visible, fem::Where(fem::Box{}));
   EXPECT_FALSE(scene.single_precision);
-  EXPECT_NO_THROW(require_rigid_insertion(scene));
+  EXPECT_NO_THROW(require_insertion(scene));
   EXPECT_NEAR(entry_m(scene)[0], 0.0, 1e-15);
   EXPECT_EQ(entry_m(scene)[1], 0.15);
 }
@@ -157,7 +157,7 @@ TEST_F(SceneTest, ReadsASolidWithEverything) {
   EXPECT_EQ(scene.plane_z_m, 0.006);
   EXPECT_EQ(scene.visible, fem::Where(fem::Side::XMax));
   EXPECT_TRUE(scene.single_precision);
-  expect_parts(error_from([&] { require_rigid_insertion(scene); }), {"file.toml:14: needle.model", "not available yet"});
+  expect_parts(error_from([&] { require_insertion(scene); }), {"file.toml:14: needle.model", "not available yet"});
 }
 
 TEST_F(SceneTest, NeedsNeitherNeedleNorContact) {
@@ -165,7 +165,7 @@ TEST_F(SceneTest, NeedsNeitherNeedleNorContact) {
   const Scene scene = read_scene(write(text));
   EXPECT_FALSE(scene.needle.has_value());
   EXPECT_FALSE(scene.contact.has_value());
-  expect_parts(error_from([&] { require_rigid_insertion(scene); }), {"file.toml: needle: missing"});
+  expect_parts(error_from([&] { require_insertion(scene); }), {"file.toml: needle: missing"});
   const Scene needle =
       read_scene(write(text + "[needle]\nmodel = \"thesis\"\nlength_m = 0.15\nouter_m = 0.0009\ninner_m = 0.0006\nyoung_pa = 2e11\n"));
   EXPECT_EQ(needle.needle->model, NeedleModel::Thesis);
@@ -295,6 +295,34 @@ TEST_F(SceneTest, RefusesNeedlesThatCannotBe) {
   refused("length_m = 0.1\n", "inner_m = 0.001\nlength_m = 0.1\nouter_m = 0.001\n", {"needle.inner_m = 0.001: not smaller"});
   expect_parts(error_of(edited(scene_text, "model = \"rigid\"", "model = \"beam\"").text, read_scene),
                {"needle.outer_m: missing", "gauge = \"22G\""});
+}
+
+TEST_F(SceneTest, ReadsWhatANeedleIsMadeOf) {
+  const auto with = [&](const std::string& keys) { return read_needle(write("[needle]\nmodel = \"beam\"\nlength_m = 0.15\n" + keys)); };
+  const Needle nitinol = with("gauge = \"20G\"\nmaterial = \"nitinol\"\ncurvature_per_m = -3.0\nbevel_deg = -30\nbevel_friction = 0.4\n");
+  EXPECT_EQ(nitinol.young_pa, 75e9);
+  EXPECT_EQ(nitinol.curvature_per_m, -3.0);
+  EXPECT_NEAR(nitinol.bevel.angle_rad, -0.52359877559829882, 1e-15);
+  EXPECT_EQ(nitinol.bevel.friction, 0.4);
+  EXPECT_NEAR(beam_of(nitinol).bending_nm2, 0.375 * 5.3754e-3, 1e-6);
+  EXPECT_EQ(with("outer_m = 0.001\ninner_m = 0.0\nmaterial = \"steel\"\nbevel = \"symmetric\"\n").young_pa, 200e9);
+  EXPECT_EQ(with("gauge = \"20G\"\nyoung_pa = 1e9\n").young_pa, 1e9);
+  // Of a whole scene the same.
+  EXPECT_EQ(read_needle(write(solid_text)).elements, 30);
+  const auto refuses = [&](const std::string& keys, std::initializer_list<std::string> parts) {
+    expect_parts(error_of("[needle]\nmodel = \"beam\"\nlength_m = 0.15\n" + keys, read_needle), parts);
+  };
+  refuses("gauge = \"20G\"\nmaterial = \"brass\"\n", {"file.toml:5: needle.material = \"brass\"", "steel", "nitinol"});
+  refuses("gauge = \"20G\"\nmaterial = \"steel\"\nyoung_pa = 1e9\n", {"needle.young_pa = 1", "remove either material or young_pa"});
+  refuses("outer_m = 0.001\ninner_m = 0.0\n", {"needle.young_pa: missing", "material"});
+  refuses("gauge = \"20G\"\nbevel_deg = 2\n", {"needle.bevel_deg = 2: flatter than 5 degrees"});
+  refuses("gauge = \"20G\"\nbevel = \"symmetric\"\nbevel_deg = 30\n", {"needle.bevel_deg = 30", "remove either"});
+  refuses("gauge = \"20G\"\nbevel_friction = 0.3\n", {"needle.bevel_friction = 0.3", "add bevel_deg"});
+  refuses("gauge = \"20G\"\ncurvature_per_m = 50.0\n", {"needle.curvature_per_m = 50"});
+  refuses("gauge = \"20G\"\nelements = 65\n", {"needle.elements = 65", "64"});
+  refuses("gauge = \"20G\"\nlenght = 65\n", {"needle.lenght", "unknown key"});
+  expect_parts(error_of("[needle]\nmodel = \"rigid\"\nlength_m = 0.1\n", [](const auto& file) { return beam_of(read_needle(file)); }),
+               {"file.toml:2: needle.model = \"rigid\"", "write \"beam\""});
 }
 
 TEST_F(SceneTest, RefusesWhatCannotBeComputed) {

@@ -1,0 +1,62 @@
+// A needle that bends, its contacts and the condensed tissue, in one solve a tick.
+//
+//   Unknown: the forces f_i of the needle on the tissue. Tissue: u = G f. Needle: Newton's step of the beam under loads -f at the
+//   arclengths s_i, r_i(f) = p_i + c_i - sum_j B_ij (f_j - f_j placed)  (needle/beam.hpp: the Schur complement of K on the contacts).
+//   What ties them, in the frame of the bent shaft at s_i with the anchor a_i:  u_i = r_i + (a_i - s_i) t_i - X_i  across the shaft, and
+//   along it with stick and slip. So contact/solver.hpp solves it, with G + B for G. A contact that slips by ds is at a_i - ds: the loads
+//   move there, and the next iteration starts from there. It ends when tissue and shaft meet at every contact and the beam is in
+//   equilibrium, measured afterwards with u and r, not with the step.
+//   Warm start: the last tick's bend, forces, states and slips.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "common/contact/working_set.hpp"
+#include "common/core/capacities.hpp"
+#include "common/model/image.hpp"
+#include "common/needle/beam.hpp"
+
+namespace trocar::insertion {
+
+class Flexible {
+ public:
+  static constexpr int max_iterations = 12;    // of Newton
+  static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
+  static constexpr double beam_tolerance_nm = 1e-11;
+
+  struct Outcome {
+    contact::SolverStatus contacts{contact::SolverStatus::Ok};
+    bool converged{};  // otherwise bend and forces are those of the last converged tick, carried on rigidly
+    int iterations{};  // of Newton
+    int pivots{};
+    int solves{};
+    double residual_n{};
+  };
+
+  void open(const model::Needle& needle) noexcept;
+  void reset() noexcept { beam_.reset(); }
+
+  // Nothing touches the needle.
+  bool free(const needle::Pose& base) noexcept;
+  // `target` brings the bounds; size of the set. Leaves forces, states, slips and anchors in the set.
+  Outcome solve(const needle::Pose& base, contact::WorkingSet& set, std::span<contact::Target> target) noexcept;
+
+  [[nodiscard]] const needle::Beam& beam() const noexcept { return beam_; }
+  // Where on the shaft, or its straight continuation, the point at x_m stands; searched from `near_m` on.
+  [[nodiscard]] double arclength_m(const contact::Vector2& x_m, double near_m) const noexcept;
+
+ private:
+  void place(const needle::Pose& base, const contact::WorkingSet& set) noexcept;
+  [[nodiscard]] double gap_n(const contact::WorkingSet& set) const noexcept;
+
+  needle::Beam beam_{};
+  contact::Solver joined_{};  // G + B
+  std::array<needle::Load, capacity::contacts> load_{};
+  std::array<double, capacity::contacts> anchor_m_{};
+  std::array<contact::Contact, capacity::contacts> contact_{}, before_{};
+  std::array<contact::Block, capacity::contacts> row_{};
+};
+
+}  // namespace trocar::insertion

@@ -1,0 +1,178 @@
+// The needle by itself: error, order and run time against the elastica, and what its parts of a tick cost against one dense Cholesky of
+// 64 x 64 in the same run. Exit code 1 when a goal is missed that does not depend on time.
+//   needle_benchmark [--out FOLDER] [--quick]
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "common/needle/beam.hpp"
+#include "tests/benchmarks/contact/output.hpp"
+#include "tests/benchmarks/contact/timing.hpp"
+#include "tests/benchmarks/needle/elastica.hpp"
+#include "tests/benchmarks/needle/output.hpp"
+
+namespace trocar::bench {
+namespace {
+
+constexpr double length = 0.15;
+constexpr double bending = 5.375e-3;  // 20G steel
+constexpr double inextensible = 1e13;
+constexpr double axial = 7.24e4;
+
+struct Options {
+  std::filesystem::path out{};
+  bool quick{};
+  [[nodiscard]] int turns(int full) const { return quick ? 3 : full; }
+};
+
+class Bench {
+ public:
+  explicit Bench(Options options) : options_(std::move(options)) {}
+  void elastica_table();
+  void parts_of_a_tick();
+  bool finish();
+
+ private:
+  Options options_;
+  std::vector<BendRow> bends_{};
+  std::vector<StepRow> steps_{};
+  std::vector<Ratio> ratios_{};
+  double floor_s_{};
+  double worst_at_16_{};
+};
+
+void Bench::elastica_table() {
+  for (const double load : {1.0, 2.0, 3.0, 5.0, 7.0, 10.0}) {
+    const ElasticaTip exact = elastica(load);
+    double coarser = 0.0;
+    for (const std::size_t elements : {2U, 4U, 8U, 16U, 32U, 64U}) {
+      auto beam = std::make_unique<needle::Beam>();
+      if (beam->open({length, bending, inextensible, 0.0, elements}) != needle::Status::Ok)
+        throw std::runtime_error("a beam cannot be opened");
+      const needle::Load tip[] = {{length, {0.0, load * bending / (length * length)}, 0.0}};
+      needle::Result result;
+      std::vector<Row> rows{{"solve", [&] {
+                               beam->reset();
+                               return timed([&] { result = beam->solve({}, tip); });
+                             }}};
+      measure(rows, options_.turns(20));
+      if (result.status != needle::Status::Ok) throw std::runtime_error("the elastica is not found");
+      const needle::Vector2 at = beam->tip().position_m;
+      const double error = std::hypot(at[0] / length - exact.x, at[1] / length - exact.y);
+      bends_.push_back({"elastica", "ours", elements, load, error, coarser > 0.0 ? std::log2(coarser / error) : 0.0, result.iterations,
+                        rows[0].median_s, rows[0].quartile_s[0], rows[0].quartile_s[1]});
+      coarser = error;
+      if (elements == 16) worst_at_16_ = std::max(worst_at_16_, error);
+    }
+  }
+  ratios_.push_back({"elastica, 16 elements, load up to 10: tip error over the length", worst_at_16_, Ratio::Goal::AtMost, 1e-3});
+}
+
+// A steering needle with 32 contacts in its front 70 %, pushed to and fro across its axis.
+void Bench::parts_of_a_tick() {
+  constexpr std::size_t points = 32;
+  auto beam = std::make_unique<needle::Beam>();
+  if (beam->open({length, bending, axial, 0.0, 24}) != needle::Status::Ok) throw std::runtime_error("a beam cannot be opened");
+  std::vector<needle::Load> loads(points);
+  std::vector<needle::Vector2> force(points);
+  long tick = 0;
+  needle::Pose base;
+  const auto next = [&] {
+    const double phase = 0.01 * static_cast<double>(++tick);
+    base.theta_rad = 1.57 + 0.02 * std::sin(phase);
+    for (std::size_t i = 0; i < points; ++i) {
+      const double s = length * (0.3 + 0.7 * (static_cast<double>(i) + 0.5 + 0.3 * std::sin(phase)) / static_cast<double>(points));
+      loads[i] = {s, {0.05 * std::cos(0.3 * static_cast<double>(i) + phase), -0.02}, 0.0};
+      force[i] = {loads[i].force_n[0] + 1e-3 * std::sin(3.0 * phase), loads[i].force_n[1]};
+    }
+  };
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Random(2 * points, 2 * points);
+  matrix = (matrix * matrix.transpose() + 64.0 * Eigen::MatrixXd::Identity(2 * points, 2 * points)).eval();
+  Eigen::LLT<Eigen::MatrixXd> cholesky(2 * points);
+  double sink = 0.0;
+  std::vector<Row> rows{{"dense Cholesky of 64 x 64: the floor",
+                         [&] {
+                           matrix(0, 0) += 1e-9;
+                           return timed([&] { sink += cholesky.compute(matrix).matrixLLT()(63, 63); });
+                         }},
+                        {"place: loads sorted, R, positions",
+                         [&] {
+                           next();
+                           return timed([&] { sink += beam->place(base, loads).residual_nm; });
+                         }},
+                        {"linearise: factor, flexibility of all points, 64 x 64",
+                         [&] {
+                           next();
+                           sink += beam->place(base, loads).residual_nm;
+                           return timed([&] { sink += beam->linearise().negative_pivots + beam->compliance(0, 31)[3]; });
+                         }},
+                        {"apply: Newton step and R",
+                         [&] {
+                           next();
+                           sink += beam->place(base, loads).residual_nm;
+                           sink += beam->linearise().negative_pivots;
+                           return timed([&] { sink += beam->apply(force).residual_nm; });
+                         }},
+                        {"solve: equilibrium under given forces, from the last tick's", [&] {
+                           next();
+                           return timed([&] { sink += beam->solve(base, loads).residual_nm; });
+                         }}};
+  measure(rows, options_.turns(40));
+  if (!std::isfinite(sink)) throw std::runtime_error("a needle of the ticks is not finite");
+  for (const Row& row : rows) steps_.push_back({row.name, row.median_s, row.quartile_s[0], row.quartile_s[1]});
+  floor_s_ = rows[0].median_s;
+  ratios_.push_back({"flexibility (linearise) over one dense Cholesky 64 x 64", rows[2].median_s / floor_s_, Ratio::Goal::None, 0.0});
+  ratios_.push_back({"a whole Newton step of the beam (linearise, apply) over it", (rows[2].median_s + rows[3].median_s) / floor_s_,
+                     Ratio::Goal::None, 0.0});
+}
+
+bool Bench::finish() {
+  print(bends_);
+  print(steps_, floor_s_);
+  print(ratios_);
+  write(options_.out, bends_, steps_);
+  fmt::print("\ntables and figures: {}\n", options_.out.string());
+  return worst_at_16_ <= 1e-3;
+}
+
+int run(int count, char** argument) {
+  Options options;
+  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
+  for (int k = 1; k < count; ++k) {
+    if (std::strcmp(argument[k], "--quick") == 0) {
+      options.quick = true;
+    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
+      options.out = argument[++k];
+    } else {
+      fmt::print(stderr, "needle_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
+      return 2;
+    }
+  }
+  Bench bench(options);
+  const auto step = [](const char* what, auto work) {
+    fmt::print(stderr, "needle_benchmark: {} …\n", what);
+    work();
+  };
+  step("elastica, 2 to 64 elements", [&] { bench.elastica_table(); });
+  step("parts of a tick", [&] { bench.parts_of_a_tick(); });
+  return bench.finish() ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace trocar::bench
+
+int main(int count, char** argument) {
+  try {
+    return trocar::bench::run(count, argument);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "needle_benchmark: {}\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,143 @@
+// A needle that bends: against the rigid one in the limit, and by what must hold in every tick.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/needle/tube.hpp"
+#include "hand.hpp"
+
+namespace trocar::insertion {
+namespace {
+
+using namespace testing;
+
+void bend(Hand& hand, double stiffer = 1.0) {
+  const needle::Section steel = needle::section_of(0.718e-3, 0.413e-3, 200e9);  // 22G
+  model::Needle& needle = hand.image().needle;
+  needle.elements = 24;
+  needle.bending_nm2 = stiffer * steel.bending_nm2;
+  needle.axial_n = stiffer * steel.axial_n;
+  hand.open();
+}
+
+struct Seen {
+  double wrench{};  // base wrench against the clamp reaction: N, and N m
+  double residual_n{};
+  int most_newton{};
+  long newton{}, ticks{};
+};
+
+void look(Seen& seen, const Hand& hand) {
+  const Result& r = hand.result();
+  ASSERT_EQ(r.status, Status::Ok);
+  const Wrench clamp = hand.model().beam().reaction();
+  if (r.contacts > 0)
+    seen.wrench = std::max(
+        {seen.wrench, std::abs(clamp.fx_n - r.base.fx_n), std::abs(clamp.fy_n - r.base.fy_n), std::abs(clamp.tau_nm - r.base.tau_nm)});
+  seen.residual_n = std::max(seen.residual_n, r.residual_n);
+  seen.most_newton = std::max(seen.most_newton, r.newton);
+  seen.newton += r.newton;
+  ++seen.ticks;
+}
+
+TEST(Flexible, IsTheRigidNeedleInTheLimit) {
+  Hand rigid(grid_of(fem::Type::Tri3));
+  Hand bending(grid_of(fem::Type::Tri3));
+  bend(bending, 1e8);
+  const auto both = [&](double dx, double dy, double turn) {
+    rigid.move(dx, dy, turn);
+    bending.move(dx, dy, turn);
+    const auto a = wrench_of(rigid.result());
+    const auto b = wrench_of(bending.result());
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], 2e-6) << k;
+    EXPECT_EQ(rigid.result().contacts, bending.result().contacts);
+    EXPECT_EQ(bending.worst(), Status::Ok);
+  };
+  both(0.0, 0.045, 0.0);
+  both(0.002, 0.0, 0.0);
+  both(0.0, 0.0, 0.03);
+  both(0.0, 0.01, 0.0);
+  both(0.0, -0.02, 0.0);
+}
+
+TEST(Flexible, BalancesTheClampInEveryTickOfASteeredInsertion) {
+  for (const fem::Type type : {fem::Type::Tri3, fem::Type::Quad4}) {
+    Hand hand(grid_of(type));
+    bend(hand);
+    Seen seen;
+    const auto walk = [&](double dx, double dy, double turn, int steps) {
+      for (int i = 0; i < steps; ++i) {
+        hand.pose.x_m += dx / steps;
+        hand.pose.y_m += dy / steps;
+        hand.pose.theta_rad += turn / steps;
+        hand.step();
+        look(seen, hand);
+        if (::testing::Test::HasFatalFailure()) return;
+      }
+    };
+    walk(0.0, 0.035, 0.0, 1750);
+    walk(0.004, 0.01, 0.0, 500);
+    walk(0.0, 0.01, -0.05, 500);
+    walk(-0.006, 0.0, 0.03, 400);
+    EXPECT_GT(hand.result().contacts, 5U);
+    walk(0.0, -0.08, 0.0, 4000);
+    EXPECT_EQ(hand.result().contacts, 0U);
+    EXPECT_LT(seen.wrench, 1e-9);
+    EXPECT_LE(seen.residual_n, Flexible::tolerance_n);
+    EXPECT_LT(static_cast<double>(seen.newton) / static_cast<double>(seen.ticks), 4.0);
+  }
+}
+
+// Thesis figure 5.14: 50 relaxations after the base is stepped by 3 mm. Here contacts that keep their places are settled at once.
+TEST(Flexible, SettlesWithinTheTickOfAStepOfTheBase) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  hand.law().explicit_count = 8;
+  for (std::size_t i = 0; i < 8; ++i) {
+    hand.law().explicit_point_m[i] = {0.0, 0.004 + 0.006 * static_cast<double>(i)};
+    hand.law().explicit_slip_force_n[i] = 0.2;
+  }
+  hand.pose = {0.0, -0.05, std::numbers::pi / 2};
+  bend(hand);
+  ASSERT_EQ(hand.result().status, Status::Ok);
+  hand.pose.x_m += 3e-3;
+  const Wrench first = hand.step().base;
+  ASSERT_EQ(hand.result().status, Status::Ok);
+  for (int k = 0; k < 50; ++k) hand.step();
+  const Wrench settled = hand.result().base;
+  EXPECT_GT(std::abs(settled.fx_n), 0.02);
+  EXPECT_NEAR(first.fx_n / settled.fx_n, 1.0, 1e-6);
+  EXPECT_NEAR(first.tau_nm / settled.tau_nm, 1.0, 1e-6);
+}
+
+// Embedded contacts follow the tip at the start of the next tick, so their places settle a tick later.
+TEST(Flexible, SettlesButForTheTipsPlaceWithEmbeddedContacts) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  bend(hand);
+  hand.move(0.0, 0.06);
+  hand.pose.x_m += 3e-3;
+  const Wrench first = hand.step().base;
+  ASSERT_EQ(hand.result().status, Status::Ok);
+  for (int k = 0; k < 50; ++k) hand.step();
+  EXPECT_NEAR(first.fx_n / hand.base().fx_n, 1.0, 5e-5);
+}
+
+// A needle that bends more than its equations hold for, or meets none: named, finite, and the next tick goes on.
+TEST(Flexible, NamesATickWithoutEquilibriumAndGoesOn) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  bend(hand, 1e-4);
+  hand.move(0.0, 0.03);
+  for (int k = 0; k < 200; ++k) {
+    hand.pose.x_m += (k % 2 == 0 ? 1.0 : -1.0) * 0.02;
+    hand.pose.theta_rad += 0.1;
+    const Result r = hand.step();
+    ASSERT_TRUE(std::isfinite(r.base.fx_n) && std::isfinite(r.base.tau_nm) && std::isfinite(r.tip.x_m)) << k;
+    ASSERT_LE(r.newton, Flexible::max_iterations);
+    if (r.status == Status::Ok) {
+      ASSERT_LE(r.residual_n, Flexible::tolerance_n);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trocar::insertion
