@@ -21,7 +21,7 @@ class Phantom {
  public:
   using Vector3 = std::array<double, 3>;
 
-  // Allocates. Throws config::UserError for a scene that cannot be computed or has no rigid needle.
+  // Allocates. Throws config::UserError for a scene that cannot be computed or has no needle that can be inserted.
   explicit Phantom(const scene::Scene& scene);
 
   // base_pose: x_m, y_m, theta_rad. Returns N, N, N m. dt_s > 0 since the last call serves the speed alone. A pose or time

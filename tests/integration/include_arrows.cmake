@@ -5,7 +5,7 @@ cmake_minimum_required(VERSION 3.25)
 
 set(rules
   "^common/ -> ^(hal|firmware|sim_plant|host)/"
-  "^common/(core|mechanism|rig|element|model|contact|insertion)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
+  "^common/(core|mechanism|rig|element|model|contact|needle|insertion)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
   "^common/core$ -> ^common/(mechanism|rig)/"
   "^common/model$ -> ^common/(contact|insertion)/"
   "^common/image_file$ -> ^common/(fem|scene|condense)/"

@@ -111,7 +111,7 @@ TEST(InsertCommand, RefusesInOneLineAndLeavesNothing) {
     return (scratch / name).string();
   };
   const std::string good = scene("good.toml", {});
-  const std::string beam = scene("beam.toml", {{"model = \"rigid\"", "model = \"beam\"\ngauge = \"22G\""}});
+  const std::string thesis = scene("thesis.toml", {{"model = \"rigid\"", "model = \"thesis\"\ngauge = \"22G\""}});
   const std::string off = scene("off.toml", {{"method = \"embedded\"", "points_m = [[0.001, 0.225]]\nslip_force_n = [0.1]"}});
   const std::string outside = scene("outside.toml", {{"method = \"embedded\"", "points_m = [[0.0, 0.5]]\nslip_force_n = [0.1]"}});
   const std::string many = scene("many.toml", {{"method = \"embedded\"", "spacing_m = 0.0001"}});
@@ -123,7 +123,7 @@ TEST(InsertCommand, RefusesInOneLineAndLeavesNothing) {
   };
   for (const Case& c :
        {Case{good, "unsorted.csv", "unsorted.csv:3"}, Case{good, "degrees.csv", "theta_rad"}, Case{good, "missing.csv", "missing.csv"},
-        Case{beam, "path.csv", "not available yet"}, Case{off, "path.csv", "shaft"}, Case{outside, "path.csv", "outside"},
+        Case{thesis, "path.csv", "offline"}, Case{off, "path.csv", "shaft"}, Case{outside, "path.csv", "outside"},
         Case{many, "path.csv", "spacing_m"}, Case{narrow, "path.csv", "corridor"},
         Case{good, "path.csv", "embedded, snap, adapt or subdivide", {"--method", "glue"}},
         Case{good, "path.csv", "tri3", {"--method", "subdivide"}}}) {

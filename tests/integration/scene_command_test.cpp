@@ -170,7 +170,7 @@ TEST_F(SceneCommand, BadScenesAreRefusedAndNothingIsWritten) {
            {"fix = [\"x\", \"y\"]", "fix = [\"x\"]", {"y"}},
            {"where = \"y_max\"", "box = [[1.0, 1.0], [2.0, 2.0]]", {"support"}},
            {"\"embedded\"", "\"subdivide\"", {"subdivide", "embedded"}},
-           {"model = \"rigid\"", "model = \"beam\"\ngauge = \"22G\"", {"not available yet", "rigid"}},
+           {"model = \"rigid\"", "model = \"thesis\"\ngauge = \"22G\"", {"offline", "rigid"}},
            {"tip_zone_m = 0.0025", "tip_zone_m = 0.0025\nspacing_m = 0.0005", {"200 contacts", "64", "spacing_m"}},
            {"tip_zone_m = 0.0025",
             "tip_zone_m = 0.0025\ncorridor = { from_m = [1.0, 0.0], to_m = [1.0, 0.1], half_width_m = 0.01 }",

@@ -12,11 +12,14 @@
 #include <stdexcept>
 #include <vector>
 
+#include "common/insertion/insertion.hpp"
 #include "common/needle/beam.hpp"
+#include "common/needle/tube.hpp"
 #include "tests/benchmarks/contact/output.hpp"
 #include "tests/benchmarks/contact/timing.hpp"
 #include "tests/benchmarks/needle/elastica.hpp"
 #include "tests/benchmarks/needle/output.hpp"
+#include "tests/reference/grid_image/grid_image.hpp"
 
 namespace trocar::bench {
 namespace {
@@ -37,6 +40,7 @@ class Bench {
   explicit Bench(Options options) : options_(std::move(options)) {}
   void elastica_table();
   void parts_of_a_tick();
+  void coupled_step();
   bool finish();
 
  private:
@@ -133,6 +137,76 @@ void Bench::parts_of_a_tick() {
                      Ratio::Goal::None, 0.0});
 }
 
+// A 22G needle about 70 mm deep in a block of soft tissue, 1 kHz: 20 mm/s forward while the base swings sideways, and back again.
+void Bench::coupled_step() {
+  reference::GridImage grid({.element = fem::Type::Tri3, .nodes_x = 41, .nodes_y = 41});
+  grid.law.spacing_m = 2.2e-3;
+  model::Image image = grid.image();
+  const needle::Section steel = needle::section_of(0.718e-3, 0.413e-3, 200e9);
+  image.needle.length_m = 0.1;
+  image.needle.elements = 24;
+  image.needle.bending_nm2 = steel.bending_nm2;
+  image.needle.axial_n = steel.axial_n;
+  auto model = std::make_unique<insertion::Insertion>();
+  model->open(image);
+  constexpr double deepest_m = 0.07, stroke_m = 2e-3, a_tick_m = 2e-5;
+  constexpr long stroke_ticks = 100;
+  insertion::Pose base{0.0, -0.105, 1.5707963267948966};
+  double clamp = 0.0;
+  long unsolved = 0;
+  std::vector<int> advancing, all;
+  const auto step = [&] {
+    const insertion::Result result = model->step(base, 1e-3);
+    if (result.status != insertion::Status::Ok) ++unsolved;
+    if (result.contacts > 0) {
+      const needle::Wrench reaction = model->beam().reaction();
+      clamp = std::max({clamp, std::abs(reaction.fx_n - result.base.fx_n), std::abs(reaction.fy_n - result.base.fy_n),
+                        std::abs(reaction.tau_nm - result.base.tau_nm)});
+    }
+    return result;
+  };
+  while (base.y_m < deepest_m - 0.1) {
+    base.y_m += 1e-4;
+    step();
+  }
+  long tick = 0;
+  const auto next = [&] {
+    const bool back = tick / stroke_ticks % 2 == 0;
+    base.y_m += (back ? -1.0 : 1.0) * stroke_m / static_cast<double>(stroke_ticks);
+    base.x_m = 3e-3 * std::sin(2.0 * 3.141592653589793 * static_cast<double>(++tick) / 950.0);
+    insertion::Result result;
+    const double seconds = timed([&] { result = step(); });
+    all.push_back(result.newton);
+    if (!back) advancing.push_back(result.newton);
+    return seconds;
+  };
+  static_assert(stroke_m == a_tick_m * stroke_ticks);
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Random(64, 64);
+  matrix = (matrix * matrix.transpose() + 64.0 * Eigen::MatrixXd::Identity(64, 64)).eval();
+  Eigen::LLT<Eigen::MatrixXd> cholesky(64);
+  double sink = 0.0;
+  std::vector<Row> rows{{"floor of the coupled step",
+                         [&] {
+                           matrix(0, 0) += 1e-9;
+                           return timed([&] { sink += cholesky.compute(matrix).matrixLLT()(63, 63); });
+                         }},
+                        {"coupled step: needle, 32 contacts, tissue", next}};
+  measure(rows, options_.turns(40));
+  if (!std::isfinite(sink)) throw std::runtime_error("the floor is not finite");
+  for (const Row& row : rows) steps_.push_back({row.name, row.median_s, row.quartile_s[0], row.quartile_s[1]});
+  const auto quantile = [](std::vector<int>& v, double part) {
+    std::sort(v.begin(), v.end());
+    return static_cast<double>(v[static_cast<std::size_t>(part * static_cast<double>(v.size() - 1))]);
+  };
+  ratios_.push_back({"coupled step over one dense Cholesky 64 x 64", rows[1].median_s / rows[0].median_s, Ratio::Goal::AtMost, 6.0});
+  ratios_.push_back({"its contacts", static_cast<double>(model->contacts()), Ratio::Goal::None, 0.0});
+  ratios_.push_back({"Newton iterations at 20 mm/s, advancing: p99", quantile(advancing, 0.99), Ratio::Goal::AtMost, 3.0});
+  ratios_.push_back({"Newton iterations, reversals included: p99", quantile(all, 0.99), Ratio::Goal::None, 0.0});
+  ratios_.push_back({"Newton iterations, reversals included: most", quantile(all, 1.0), Ratio::Goal::None, 0.0});
+  ratios_.push_back({"ticks without a solution", static_cast<double>(unsolved), Ratio::Goal::AtMost, 0.0});
+  ratios_.push_back({"base wrench against the clamp's reaction, N and N m", clamp, Ratio::Goal::AtMost, 1e-9});
+}
+
 bool Bench::finish() {
   print(bends_);
   print(steps_, floor_s_);
@@ -162,6 +236,7 @@ int run(int count, char** argument) {
   };
   step("elastica, 2 to 64 elements", [&] { bench.elastica_table(); });
   step("parts of a tick", [&] { bench.parts_of_a_tick(); });
+  step("the coupled step", [&] { bench.coupled_step(); });
   return bench.finish() ? 0 : 1;
 }
 
