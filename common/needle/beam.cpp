@@ -86,7 +86,7 @@ void Beam::rank(std::span<const Load> loads) noexcept {
     ranked.overhang_m = s > length ? s - length : std::min(s, 0.0);
     const double inside = std::clamp(s, 0.0, length);
     const auto element = std::min(static_cast<std::size_t>(inside / element_m()), properties_.elements - 1);
-    ranked.element = static_cast<std::uint16_t>(element);
+    ranked.element = element;
     ranked.shape = s >= length ? Shape{0.0, 0.0, 1.0} : s <= 0.0 ? Shape{1.0, 0.0, 0.0} : shape_at(element, s);
   }
 }
@@ -107,7 +107,7 @@ void Beam::cut() noexcept {
       Interval& interval = interval_[intervals_];
       interval.from_m = from;
       interval.to_m = std::min(load_at, end);
-      interval.element = static_cast<std::uint16_t>(e);
+      interval.element = e;
       interval.next = static_cast<std::uint16_t>(next);
       for (std::size_t g = 0; g < gauss_points; ++g) {
         const double width = interval.to_m - from;
@@ -369,11 +369,12 @@ Result Beam::solve(const Pose& base, std::span<const Load> loads) noexcept {
     const bool last = !indefinite && largest <= correction_rad;
     double part = std::min(1.0, longest_step_rad / largest);
     bool taken = false;
-    for (; result.iterations < max_iterations && !taken; part *= 0.5) {
+    while (result.iterations < max_iterations && !taken) {
       ++result.iterations;
       for (std::size_t k = 1; k < nodes_; ++k) bend_[k] = from[k] + part * step[k];
       const bool known = assemble();
       taken = last || (known && energy_j_ <= energy_j + 1e-4 * part * slope_j + noise_j);
+      part *= 0.5;
     }
     if (!taken) {
       bend_ = from;

@@ -163,7 +163,7 @@ class Beam {
   };
   struct Interval {
     double from_m{}, to_m{};
-    std::uint16_t element{};
+    std::size_t element{};
     std::uint16_t next{};  // first load, by rank, that pulls at it
     Vector2 force_n{};     // N
     Vector2 start_m{};
@@ -174,8 +174,8 @@ class Beam {
   // A load by rank, that is in order of arclength.
   struct Ranked {
     Load load{};
-    std::uint16_t after{};    // intervals between base and load
-    std::uint16_t element{};  // whose theta it sees
+    std::uint16_t after{};  // intervals between base and load
+    std::size_t element{};  // whose theta it sees
     Shape shape{};
     double overhang_m{};  // beyond the tip (> 0) or before the base (< 0)
   };

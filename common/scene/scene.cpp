@@ -32,7 +32,7 @@ Needle read_needle(const std::filesystem::path& file) {
     throw config::UserError(
         fmt::format("{}: needle: missing; add the table [needle] with model = \"beam\", length_m and gauge", file.string()));
   }
-  const Needle needle = needle_of(root.table("needle"));
+  Needle needle = needle_of(root.table("needle"));
   document.refuse_unknown_keys();
   return needle;
 }

@@ -159,6 +159,7 @@ TEST(Flexibility, PredictsTheStepItTakes) {
 TEST(Flexibility, NewtonByHandConvergesWithTheSquare) {
   const std::vector<Load> loads = some_loads();
   std::vector<Vector2> force;
+  force.reserve(loads.size());
   for (const Load& load : loads) force.push_back(load.force_n);
   const auto exact = solved(base, loads);
   auto beam = std::make_unique<Beam>();
