@@ -103,7 +103,7 @@ TEST_F(SceneCommand, CheckSaysWhatCompilingWouldCost) {
   const auto before = files_in(work);
   const Said said = run({"scene", "check", scene()});
   EXPECT_EQ(said.code, 0) << said.errors;
-  for (const char* word : {"121 nodes", "100 elements", "242 unknowns", "7 of 64", "MB", "good to solve and to compile"})
+  for (const char* word : {"121 nodes", "100 elements", "242 unknowns", "10 of 64", "MB", "good to solve and to compile"})
     EXPECT_NE(said.out.find(word), std::string::npos) << word << " is missing in " << said.out;
   EXPECT_EQ(run({"scene", "check", "phantom"}).code, 0);
   const Said json = run({"scene", "check", scene(), "--json"});
@@ -137,7 +137,7 @@ TEST_F(SceneCommand, CompiledImageIsWhatInfoShows) {
   for (const std::string& said : {of_image.out, of_scene.out}) {
     EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
     for (const std::string& word : {bytes, std::string("\"candidates\": 121, "), std::string("\"storage\": \"float64\""),
-                                    std::string("\"contacts\": 7, "), std::string("\"tick_contacts\": 7")})
+                                    std::string("\"contacts\": 10, "), std::string("\"tick_contacts\": 10")})
       EXPECT_NE(said.find(word), std::string::npos) << word << " is missing in " << said;
   }
   EXPECT_NE(of_scene.out.find("\"compile_s\": 0."), std::string::npos) << of_scene.out;

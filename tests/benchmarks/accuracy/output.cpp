@@ -99,7 +99,8 @@ void print(const std::vector<Claim>& claims) {
 }
 
 void print_convergence(const std::vector<ErrorRow>& rows, const std::vector<SolidAnswer>& solids) {
-  fmt::print("\nEmbedded, plane: errors halve with the elements (segments are an edge long); observed order between meshes of h and h / 2\n");
+  fmt::print(
+      "\nEmbedded, plane: errors halve with the elements (segments are an edge long); observed order between meshes of h and h / 2\n");
   fmt::print("{:<14} {:<5} {:>10} {:>17} {:>17} {:>17} {:>17}\n", "path", "cells", "sides", metric_name[0], metric_name[1], metric_name[5],
              metric_name[6]);
   for (const ErrorRow& coarse : rows)
