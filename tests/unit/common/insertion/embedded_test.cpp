@@ -107,7 +107,7 @@ TEST(Embedded, MirrorsWithItsScene) {
   EXPECT_NEAR(left.base().tau_nm, -right.base().tau_nm, 1e-9);
 }
 
-// One force per edge along a grid line is the mesh's worst case: nodes hardly feel forces that alternate. Both directions, stuck.
+// One force per edge along a grid line is the mesh's worst case: nodes hardly feel forces that alternate. Stuck, along the line.
 TEST(Embedded, ForcesDoNotAlternateAlongAGridLine) {
   for (const fem::Type type : {fem::Type::Quad4, fem::Type::Tri3}) {
     Hand hand(grid_of(type));
