@@ -230,7 +230,7 @@ TEST_F(SceneCommand, ImagesThatAreDamagedOrForeignAreRefusedByName) {
   write_text(bad, flipped);
   expect_refusal({"scene", "info", bad}, {bad, "damaged"});
   std::string newer = good;
-  newer[12] = 2;
+  newer[12] = static_cast<char>(newer[12] + 1);
   write_text(bad, newer);
   expect_refusal({"scene", "info", bad}, {bad, "another version"});
   write_text(bad, read_text(visible));
