@@ -121,12 +121,11 @@ TEST(InsertCommand, RefusesInOneLineAndLeavesNothing) {
     std::string scene, path, says;
     std::vector<std::string> more{};
   };
-  for (const Case& c :
-       {Case{good, "unsorted.csv", "unsorted.csv:3"}, Case{good, "degrees.csv", "theta_rad"}, Case{good, "missing.csv", "missing.csv"},
-        Case{thesis, "path.csv", "offline"}, Case{off, "path.csv", "shaft"}, Case{outside, "path.csv", "outside"},
-        Case{many, "path.csv", "spacing_m"}, Case{narrow, "path.csv", "corridor"},
-        Case{good, "path.csv", "embedded, snap, adapt or subdivide", {"--method", "glue"}},
-        Case{good, "path.csv", "tri3", {"--method", "subdivide"}}}) {
+  for (const Case& c : {Case{good, "unsorted.csv", "unsorted.csv:3"}, Case{good, "degrees.csv", "theta_rad"},
+                        Case{good, "missing.csv", "missing.csv"}, Case{thesis, "path.csv", "offline"}, Case{off, "path.csv", "shaft"},
+                        Case{outside, "path.csv", "outside"}, Case{many, "path.csv", "spacing_m"}, Case{narrow, "path.csv", "corridor"},
+                        Case{good, "path.csv", "embedded, snap, adapt or subdivide", {"--method", "glue"}},
+                        Case{good, "path.csv", "tri3", {"--method", "subdivide"}}}) {
     std::vector<std::string> arguments{"insert",         c.scene,
                                        "--path",         (scratch / c.path).string(),
                                        "--out",          (scratch / "out.csv").string(),
