@@ -83,8 +83,16 @@ bool Insertion::place_explicit() noexcept {
   const Vector2 base{pose_.x_m, pose_.y_m};
   for (std::size_t i = 0; i < law.explicit_count; ++i) {
     const Vector2 from_base{law.explicit_point_m[i][0] - base[0], law.explicit_point_m[i][1] - base[1]};
-    const double lateral = axis_[0] * from_base[1] - axis_[1] * from_base[0];
-    const bool on_shaft = std::abs(lateral) <= explicit_point_tolerance_m && dot(axis_, from_base) >= -explicit_point_tolerance_m;
+    double along = dot(axis_, from_base);
+    double lateral = axis_[0] * from_base[1] - axis_[1] * from_base[0];
+    if (bends_) {
+      // Unloaded, but not straight where it has a curvature of its own.
+      along = flexible_.arclength_m(law.explicit_point_m[i], along);
+      const needle::Station at = flexible_.beam().at(along);
+      lateral =
+          at.tangent[0] * (law.explicit_point_m[i][1] - at.position_m[1]) - at.tangent[1] * (law.explicit_point_m[i][0] - at.position_m[0]);
+    }
+    const bool on_shaft = std::abs(lateral) <= explicit_point_tolerance_m && along >= -explicit_point_tolerance_m;
     if (!on_shaft || !set_.place(law.explicit_point_m[i])) {
       set_.clear();
       return false;

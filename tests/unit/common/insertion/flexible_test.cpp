@@ -122,6 +122,23 @@ TEST(Flexible, SettlesButForTheTipsPlaceWithEmbeddedContacts) {
   EXPECT_NEAR(first.fx_n / hand.base().fx_n, 1.0, 5e-5);
 }
 
+TEST(Flexible, RefusesAnExplicitContactBesideTheCurvedShaft) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  hand.law().explicit_count = 1;
+  hand.law().explicit_slip_force_n[0] = 0.2;
+  hand.pose = {0.0, -0.05, std::numbers::pi / 2};
+  hand.image().needle.curvature_per_m = 2.0;
+  hand.law().explicit_point_m[0] = {0.0, 0.03};  // on the straight line that the shaft leaves
+  bend(hand);
+  EXPECT_EQ(hand.result().status, Status::OffShaft);
+  // Counter-clockwise on a circle of radius 1 / 2 m that leaves the base along +y.
+  const double angle = 2.0 * 0.08;
+  hand.law().explicit_point_m[0] = {-0.5 * (1.0 - std::cos(angle)), -0.05 + 0.5 * std::sin(angle)};
+  hand.open();
+  EXPECT_EQ(hand.result().status, Status::Ok);
+  EXPECT_NEAR(hand.model().contact(0).arclength_m, 0.08, 1e-6);
+}
+
 // A needle that bends more than its equations hold for, or meets none: named, finite, and the next tick goes on.
 TEST(Flexible, NamesATickWithoutEquilibriumAndGoesOn) {
   Hand hand(grid_of(fem::Type::Tri3));

@@ -47,5 +47,26 @@ TEST(InsertionNoAllocation, ThroughInsertionTurnAdaptationAndWithdrawal) {
   }
 }
 
+TEST(InsertionNoAllocation, OfANeedleThatBends) {
+  const reference::GridImage grid({.element = fem::Type::Tri3, .nodes_x = 13, .nodes_y = 13});
+  Hand hand(grid);
+  hand.image().needle.elements = 24;
+  hand.image().needle.bending_nm2 = 2.3e-3;
+  hand.image().needle.axial_n = 5e4;
+  hand.open();
+  const std::size_t before = allocations;
+  ASSERT_GT(before, 0u);
+  hand.move(0.001, 0.05, 0.03);
+  const int newton = hand.result().newton;
+  hand.pose.x_m += 0.05;  // far out of what it can follow
+  hand.step();
+  hand.pose.x_m -= 0.05;
+  hand.move(0.0, -0.07);
+  hand.model().reset();
+  const std::size_t after = allocations;
+  EXPECT_EQ(after, before);
+  EXPECT_GT(newton, 0);
+}
+
 }  // namespace
 }  // namespace trocar::insertion
