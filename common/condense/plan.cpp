@@ -11,6 +11,7 @@
 #include "common/core/capacities.hpp"
 #include "common/fem/assembly.hpp"
 #include "common/fem/statics.hpp"
+#include "common/needle/bevel.hpp"
 
 namespace trocar::condense {
 namespace {
@@ -91,6 +92,9 @@ void check_method(const scene::Scene& scene, bool solid) {
     throw fem::Error("no [needle] or no [contact]: an image needs both; write them as in host/share/scenes");
   if (scene.needle->model == scene::NeedleModel::Thesis)
     throw fem::Error("needle.model = \"thesis\" is computed offline alone; write model = \"beam\" or \"rigid\"");
+  if (needle::lateral_per_axial(scene.needle->bevel) != 0.0)
+    throw fem::Error(
+        "needle.bevel_deg: the side force of a bevel does not act in an insertion yet; remove it, or write bevel = \"symmetric\"");
   if (scene.contact->method == contact::Method::Subdivide)
     throw fem::Error(
         "contact.method = \"subdivide\" changes the unknowns, which an image cannot; write \"embedded\", \"snap\" or \"adapt\"");

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 #include <vector>
 
@@ -151,7 +152,7 @@ void Bench::coupled_step() {
   model->open(image);
   constexpr double deepest_m = 0.07, stroke_m = 2e-3, a_tick_m = 2e-5;
   constexpr long stroke_ticks = 100;
-  insertion::Pose base{0.0, -0.105, 1.5707963267948966};
+  insertion::Pose base{0.0, -0.105, std::numbers::pi / 2};
   double clamp = 0.0;
   long unsolved = 0;
   std::vector<int> advancing, all;
@@ -173,7 +174,7 @@ void Bench::coupled_step() {
   const auto next = [&] {
     const bool back = tick / stroke_ticks % 2 == 0;
     base.y_m += (back ? -1.0 : 1.0) * stroke_m / static_cast<double>(stroke_ticks);
-    base.x_m = 3e-3 * std::sin(2.0 * 3.141592653589793 * static_cast<double>(++tick) / 950.0);
+    base.x_m = 3e-3 * std::sin(2.0 * std::numbers::pi * static_cast<double>(++tick) / 950.0);
     insertion::Result result;
     const double seconds = timed([&] { result = step(); });
     all.push_back(result.newton);
