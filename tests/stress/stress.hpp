@@ -7,7 +7,11 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "tests/reference/allocations/allocations.hpp"
+
 namespace trocar::stress {
+
+using reference::allocations;
 
 // Full counts only when asked for (./run stress).
 [[nodiscard]] inline bool full() {
@@ -15,9 +19,6 @@ namespace trocar::stress {
   return wanted != nullptr && std::string_view(wanted) == "full";
 }
 [[nodiscard]] inline long counts(long short_run, long full_run) { return full() ? full_run : short_run; }
-
-// Calls of operator new since the program began.
-[[nodiscard]] std::size_t allocations() noexcept;
 
 // FNV-1a over the bits of numbers.
 class Fingerprint {

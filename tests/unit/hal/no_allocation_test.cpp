@@ -2,30 +2,19 @@
 // of the link and of the simulated nodes allocate nothing.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <memory>
-#include <new>
 
+#include "tests/reference/allocations/allocations.hpp"
 #include "wired_rig.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace trocar::hal {
 namespace {
 
+using reference::allocations;
+
 TEST(NoAllocation, FromBringUpToShutDown) {
   const auto w = std::make_unique<WiredRig>();
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   ASSERT_GT(before, 0u);  // the counter works
   w->command.request = DriveRequest::Enable;
   w->command.joint_torque_nm.fill(0.2);
@@ -37,7 +26,7 @@ TEST(NoAllocation, FromBringUpToShutDown) {
   const bool named = step[0] != '\0';
   w->link.shut_down(w->now_ns);
   w->tick();
-  const std::size_t after = allocations;
+  const std::size_t after = allocations();
   EXPECT_EQ(after, before);
   EXPECT_TRUE(enabled);
   EXPECT_TRUE(named);

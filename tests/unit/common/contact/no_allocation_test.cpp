@@ -1,25 +1,13 @@
 // A program of its own, because it replaces the allocator: no operation of the solver allocates.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
 #include "problem.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/reference/allocations/allocations.hpp"
 
 namespace trocar::contact {
 namespace {
+
+using reference::allocations;
 
 using namespace testing;
 
@@ -32,7 +20,7 @@ TEST(ContactNoAllocation, ThroughEveryOperationOfTheSolver) {
   std::vector<std::vector<Target>> target;
   for (int k = 0; k < 50; ++k) target.push_back(targets_of(random_contacts(random, s)));
   const auto solver = std::make_unique<Solver>();
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   ASSERT_GT(before, 0u);  // the counter works
   int pivots = 0;
   for (const std::vector<Target>& t : target) {
@@ -48,7 +36,7 @@ TEST(ContactNoAllocation, ThroughEveryOperationOfTheSolver) {
   }
   (void)solver->factor_drift();
   solver->clear();
-  const std::size_t after = allocations;
+  const std::size_t after = allocations();
   EXPECT_EQ(after, before);
   EXPECT_GT(pivots, 100);
 }

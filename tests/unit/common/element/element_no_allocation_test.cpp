@@ -1,33 +1,13 @@
 // A program of its own, because it replaces the allocator: no kernel allocates.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
 #include "common/element/element.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-// Eigen's allocator goes around operator new; it is caught in the C library, unless a sanitizer needs that place for itself.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#endif
+#include "tests/reference/allocations/allocations.hpp"
 
 namespace trocar::element {
 namespace {
+
+using reference::allocations;
 
 TEST(ElementNoAllocation, InAnyKernel) {
   Corners quad = Corners::Zero();
@@ -42,11 +22,11 @@ TEST(ElementNoAllocation, InAnyKernel) {
   ShapeGradient gradient;
   Eigen::Vector3d natural;
 
-  const std::size_t at_start = allocations;
+  const std::size_t at_start = allocations();
   void* volatile counted = ::operator new(1);
   ::operator delete(counted);
-  ASSERT_GT(allocations, at_start);  // the counter works
-  const std::size_t before = allocations;
+  ASSERT_GT(allocations(), at_start);  // the counter works
+  const std::size_t before = allocations();
   bool good = true;
   for (const Integration integration : {Integration::Full, Integration::BBar}) {
     for (const Model model : {Model::PlaneStress, Model::PlaneStrain, Model::Solid}) {
@@ -61,7 +41,7 @@ TEST(ElementNoAllocation, InAnyKernel) {
       }
     }
   }
-  const std::size_t after = allocations;
+  const std::size_t after = allocations();
   EXPECT_EQ(after, before);
   EXPECT_TRUE(good);
 }

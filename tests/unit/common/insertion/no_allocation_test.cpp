@@ -1,25 +1,13 @@
 // A program of its own, because it replaces the allocator: once opened, a step allocates nothing.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
 #include "hand.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/reference/allocations/allocations.hpp"
 
 namespace trocar::insertion {
 namespace {
+
+using reference::allocations;
 
 using namespace testing;
 
@@ -29,7 +17,7 @@ TEST(InsertionNoAllocation, ThroughInsertionTurnAdaptationAndWithdrawal) {
     Hand hand(grid, method);
     hand.law().velocity = rising_law();
     hand.open();
-    const std::size_t before = allocations;
+    const std::size_t before = allocations();
     ASSERT_GT(before, 0u);  // the counter works
     hand.move(0.001, 0.07, 0.05);
     const std::size_t most_contacts = hand.model().contacts();
@@ -39,7 +27,7 @@ TEST(InsertionNoAllocation, ThroughInsertionTurnAdaptationAndWithdrawal) {
     hand.pose.x_m = std::nan("");
     hand.step();
     hand.model().reset();
-    const std::size_t after = allocations;
+    const std::size_t after = allocations();
     EXPECT_EQ(after, before);
     EXPECT_GT(most_contacts, 6u);
     EXPECT_EQ(moved > 0, method == contact::Method::Adapt);
@@ -54,7 +42,7 @@ TEST(InsertionNoAllocation, OfANeedleThatBends) {
   hand.image().needle.bending_nm2 = 2.3e-3;
   hand.image().needle.axial_n = 5e4;
   hand.open();
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   ASSERT_GT(before, 0u);
   hand.move(0.001, 0.05, 0.03);
   const int newton = hand.result().newton;
@@ -63,7 +51,7 @@ TEST(InsertionNoAllocation, OfANeedleThatBends) {
   hand.pose.x_m -= 0.05;
   hand.move(0.0, -0.07);
   hand.model().reset();
-  const std::size_t after = allocations;
+  const std::size_t after = allocations();
   EXPECT_EQ(after, before);
   EXPECT_GT(newton, 0);
 }

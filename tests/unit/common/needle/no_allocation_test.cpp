@@ -1,41 +1,23 @@
 // A program of its own, because it replaces the allocator: no operation of the needle allocates.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "common/needle/beam.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  std::abort();
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  ++allocations;
-  if (void* memory = std::aligned_alloc(static_cast<std::size_t>(alignment), size)) return memory;
-  std::abort();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+#include "tests/reference/allocations/allocations.hpp"
 
 namespace trocar::needle {
 namespace {
+
+using reference::allocations;
 
 TEST(NeedleNoAllocation, ThroughEveryOperationOfTheBeam) {
   const auto beam = std::make_unique<Beam>();
   std::vector<Load> loads(Beam::most_loads);
   for (std::size_t i = 0; i < loads.size(); ++i) loads[i] = {0.0025 * static_cast<double>(i), {-0.01, 0.02}, 1e-4};
   const std::vector<Vector2> force(loads.size(), Vector2{0.01, -0.01});
-  const std::size_t before = allocations;
+  const std::size_t before = allocations();
   ASSERT_GT(before, 0u);  // the counter works
   double sum = 0.0;
   ASSERT_EQ(beam->open({0.15, 5.4e-3, 7e4, 1.0, capacity::needle_elements}), Status::Ok);
@@ -50,7 +32,7 @@ TEST(NeedleNoAllocation, ThroughEveryOperationOfTheBeam) {
     sum += beam->at(0.07).theta_rad + beam->reaction().tau_nm;
     beam->reset();
   }
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(allocations(), before);
   EXPECT_NE(sum, 0.0);
 }
 
