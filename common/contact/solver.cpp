@@ -64,7 +64,7 @@ std::array<double, n> times(const std::array<std::array<double, n>, n>& a, const
 Vector2 Solver::direction(const Unknown& unknown) const noexcept {
   if (unknown.direction == Direction::X) return {1.0, 0.0};
   if (unknown.direction == Direction::Y) return {0.0, 1.0};
-  return {-tangent_y_[unknown.contact], tangent_x_[unknown.contact]};
+  return {-row_y_[unknown.contact], row_x_[unknown.contact]};
 }
 
 void Solver::set_row(std::size_t i, std::span<const Block> row) noexcept {
@@ -77,6 +77,7 @@ void Solver::set_row(std::size_t i, std::span<const Block> row) noexcept {
   }
   // The own block is symmetric to the bit.
   compliance_[2 * i + 1][i] = compliance_[2 * i][half + i];
+  own_[i] = compliance(i, i);
   evaluated_ = false;
 }
 
@@ -94,6 +95,8 @@ void Solver::withdraw(std::size_t i) noexcept {
 void Solver::enter(std::size_t i) noexcept {
   const auto contact = static_cast<std::uint16_t>(i);
   if (slipping(contact_[i].state)) {
+    row_x_[i] = tangent_x_[i];
+    row_y_[i] = tangent_y_[i];
     order_[unknowns_++] = {contact, Direction::Normal};
   } else {
     order_[unknowns_++] = {contact, Direction::X};
@@ -123,6 +126,33 @@ void Solver::push(std::span<const Block> row, const Contact& start) noexcept {
   enter(i);
 }
 
+void Solver::join(const Solver& tissue, std::span<const double> softness, std::size_t part) noexcept {
+  clear();
+  joined_ = true;
+  size_ = tissue.size_;
+  for (std::size_t k = 0; k < 2 * size_; ++k) {
+    const double* __restrict const soft = &softness[2 * part * k];
+    const double* __restrict const stiff = tissue.compliance_[k].data();
+    double* __restrict const column = compliance_[k].data();
+    for (std::size_t i = 0; i < size_; ++i) column[i] = stiff[i] + soft[i];
+    for (std::size_t i = 0; i < size_; ++i) column[half + i] = stiff[half + i] + soft[part + i];
+  }
+  tangent_x_ = tissue.tangent_x_;
+  tangent_y_ = tissue.tangent_y_;
+  for (std::size_t i = 0; i < size_; ++i) {
+    own_[i] = tissue.compliance(i, i);
+    contact_[i] = tissue.contact_[i];
+    put_force(i);
+    enter(i);
+  }
+  evaluate();
+}
+
+int Solver::negative_pivots() const noexcept {
+  return static_cast<int>(std::count_if(inverse_pivot_.begin(), inverse_pivot_.begin() + static_cast<std::ptrdiff_t>(valid_),
+                                        [](double inverse) { return inverse < 0.0; }));
+}
+
 void Solver::assume(std::span<const Contact> contact) noexcept {
   for (std::size_t i = 0; i < size_; ++i) {
     set_state(i, contact[i].state);
@@ -144,6 +174,7 @@ void Solver::replace_own(std::size_t i, const Block& own) noexcept {
   compliance_[2 * i][i] = own[0];
   compliance_[2 * i][half + i] = compliance_[2 * i + 1][i] = own[1];
   compliance_[2 * i + 1][half + i] = own[3];
+  own_[i] = own;
   evaluated_ = false;
   withdraw(i);
   enter(i);
@@ -157,7 +188,7 @@ void Solver::pop() noexcept {
 
 void Solver::clear() noexcept {
   size_ = unknowns_ = valid_ = 0;
-  evaluated_ = false;
+  evaluated_ = joined_ = false;
 }
 
 void Solver::put_force(std::size_t i) noexcept {
@@ -203,8 +234,13 @@ void Solver::turn(std::span<const Target> target) noexcept {
       tangent_y_[i] = now.tangent[1];
       if (slipping(c.state)) {
         compose_force(i, c.axial_n, c.lateral_n);
-        for (std::size_t k = 0; k < first_turned; ++k)
-          if (order_[k].contact == i) first_turned = k;
+        const bool row_holds = joined_ && std::abs(row_x_[i] - now.tangent[0]) + std::abs(row_y_[i] - now.tangent[1]) <= frame_slack;
+        if (!row_holds) {
+          row_x_[i] = now.tangent[0];
+          row_y_[i] = now.tangent[1];
+          for (std::size_t k = 0; k < first_turned; ++k)
+            if (order_[k].contact == i) first_turned = k;
+        }
       } else {
         resolve_force(i);
       }
@@ -243,8 +279,8 @@ void Solver::assemble_rows(std::size_t first) noexcept {
   double* __restrict x = row.data();
   double* __restrict y = x + half;
   double* __restrict n = y + half;
-  const double* __restrict tx = tangent_x_.data();
-  const double* __restrict ty = tangent_y_.data();
+  const double* __restrict tx = row_x_.data();
+  const double* __restrict ty = row_y_.data();
   std::size_t contacts = 0;  // up to the last one so far, in whole vectors
   for (std::size_t a = 0; a < unknowns_; ++a) {
     const std::size_t i = order_[a].contact;
@@ -275,7 +311,8 @@ int Solver::factorise() noexcept {
     const double diagonal = column[j];
     subtract(column, std::max(j, first), end, factor_[0].data(), stride, column, j);
     if (j >= first) {
-      column[j] = std::max(column[j], smallest_pivot * std::abs(diagonal) + std::numeric_limits<double>::min());
+      const double least = smallest_pivot * std::abs(diagonal) + std::numeric_limits<double>::min();
+      column[j] = joined_ && column[j] < -least ? column[j] : std::max(column[j], least);
       inverse_pivot_[j] = 1.0 / column[j];
     }
     const double inverse = inverse_pivot_[j];
@@ -314,7 +351,9 @@ void Solver::solve_unknowns(std::span<const Target> target) noexcept {
   for (std::size_t a = 0; a < end; ++a) {
     const std::size_t i = order_[a].contact;
     const Vector2 gap{target[i].gap_m[0] - displacement_[i], target[i].gap_m[1] - displacement_[half + i]};
-    y[a] = dot(direction(order_[a]), gap);
+    // In the tick's frame, which the row of L may lag behind.
+    const bool across = order_[a].direction == Direction::Normal;
+    y[a] = across ? tangent_x_[i] * gap[1] - tangent_y_[i] * gap[0] : gap[order_[a].direction == Direction::X ? 0 : 1];
   }
   // By blocks of unknowns: inside of a block the inverse of its part of L, what it does to the others is one sweep over its columns.
   // Forwards z = D^-1 L^-1 y, backwards x = L^-T z, both in place.
@@ -358,7 +397,7 @@ void Solver::judge(std::span<const Target> target, double enough_n, Violations& 
     const Vector2 t{tangent_x_[i], tangent_y_[i]};
     const Vector2 n = normal(t);
     const Vector2 gap{at.gap_m[0] - displacement_[i], at.gap_m[1] - displacement_[half + i]};
-    const Block own = compliance(i, i);
+    const Block& own = own_[i];
     c.slip_m = dot(t, gap);
     const double axial_gap_n = c.slip_m / quadratic(own, t);
     const double lateral_n = std::abs(dot(n, gap)) / quadratic(own, n);
@@ -481,7 +520,7 @@ void Solver::release_worst(std::span<const Target> target, const Violations& v) 
   double most_n = -1.0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(v.count); ++k) {
     const std::size_t i = v.contact[k];
-    const double gain_n = std::abs(contact_[i].slip_m) / quadratic(compliance(i, i), target[i].tangent);
+    const double gain_n = std::abs(contact_[i].slip_m) / quadratic(own_[i], target[i].tangent);
     if (v.becomes[k] == State::Stuck && gain_n > most_n) {
       most_n = gain_n;
       worst = i;

@@ -78,6 +78,13 @@ class Solver {
   void push(std::span<const Block> row) noexcept;
   // The same, from a force (its parts hold in whatever frame comes next while it slips) and a state.
   void push(std::span<const Block> row, const Contact& start) noexcept;
+  // Starts from `tissue`, whose compliance something in series makes softer: a needle that bends. `softness` has the columns x and y of
+  // contact 0, of contact 1, …, each `part` displacements x and then as many y, part >= size(). The sum may be indefinite although the
+  // whole is stable, so pivots may be negative; residuals are measured in the tissue's own compliances; and a slipping contact's row
+  // outlives turns up to frame_slack, the refinement takes the difference. No push, replace or pop until clear().
+  void join(const Solver& tissue, std::span<const double> softness, std::size_t part) noexcept;
+  static constexpr double frame_slack = 1e-3;
+  [[nodiscard]] int negative_pivots() const noexcept;  // of the last factor: negative eigenvalues of M
   // Takes force, state and slip from elsewhere: u = G f follows at once.
   void assume(std::span<const Contact> contact) noexcept;
   // The compliance of contact i changed: blocks with contacts 0 … i. Forces and states stay.
@@ -159,6 +166,8 @@ class Solver {
   alignas(64) Column displacement_{}, unknown_{};
   alignas(64) std::array<double, 2 * capacity> reaction_{};  // -f: x and y of contact 0, of contact 1, …
   alignas(64) std::array<double, half> tangent_x_{}, tangent_y_{};
+  alignas(64) std::array<double, half> row_x_{}, row_y_{};  // tangents that the rows of L were made with
+  std::array<Block, capacity> own_{};                       // compliances by which residuals are measured
   std::array<double, 2 * capacity> inverse_pivot_{};
   static constexpr std::size_t block = 8;
   struct BlockInverse {
@@ -168,6 +177,7 @@ class Solver {
   std::array<Unknown, 2 * capacity> order_{};
   std::array<Contact, capacity> contact_{};
   bool evaluated_{true};
+  bool joined_{false};
 };
 
 }  // namespace trocar::contact

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace trocar::insertion {
 
 using contact::Block;
 using contact::Vector2;
+
+namespace {
+Vector2 tangent_at(double theta_rad) noexcept { return {std::cos(theta_rad), std::sin(theta_rad)}; }
+}  // namespace
 
 void Flexible::open(const model::Needle& needle) noexcept {
   static_cast<void>(beam_.open({.length_m = needle.length_m,
@@ -30,97 +35,118 @@ double Flexible::arclength_m(const Vector2& x_m, double near_m) const noexcept {
   return s;
 }
 
-void Flexible::place(const needle::Pose& base, const contact::WorkingSet& set) noexcept {
+// Forces and arclengths of the loads from the contacts' forces and slips.
+void Flexible::take(const contact::WorkingSet& set) noexcept {
   for (std::size_t i = 0; i < set.size(); ++i) {
-    const Vector2& f = set.solver().contact(i).force_n;
-    load_[i].force_n = {-f[0], -f[1]};
+    const contact::Contact& c = set.solver().contact(i);
+    load_[i].arclength_m = anchor_m_[i] - (c.state == contact::State::Stuck ? 0.0 : c.slip_m);
+    load_[i].force_n = {-c.force_n[0], -c.force_n[1]};
   }
+}
+
+// The last tick's bend, forces and slips on the new base.
+void Flexible::start(const needle::Pose& base, contact::WorkingSet& set) noexcept {
+  beam_.restore();
+  set.solver().assume({before_.data(), set.size()});
+  take(set);
   static_cast<void>(beam_.place(base, {load_.data(), set.size()}));
 }
 
-// What is left between tissue and shaft.
-double Flexible::gap_n(const contact::WorkingSet& set) const noexcept {
+bool Flexible::linearise(needle::Tangent tangent, const contact::WorkingSet& set) noexcept {
+  const needle::Factor factor = beam_.linearise(tangent);
+  if (factor.status != needle::Status::Ok) return false;
+  beam_negative_ = factor.negative_pivots;
+  joined_.join(set.solver(), beam_.flexibility(), needle::Beam::most_loads);
+  return true;
+}
+
+// What is left between tissue and shaft, and between the forces and the law of friction in the frame of the shaft as it stands.
+double Flexible::residual_n(const contact::WorkingSet& set, std::span<const contact::Target> target) const noexcept {
   double worst_n = 0.0;
   for (std::size_t i = 0; i < set.size(); ++i) {
     const Vector2 r = beam_.position_m(i);
     const Vector2 u = set.solver().displacement_m(i);
     const Vector2& x = set.point(i).material_m;
-    const Block own = joined_.compliance(i, i);
-    worst_n = std::max(worst_n, std::hypot(r[0] - x[0] - u[0], r[1] - x[1] - u[1]) / std::min(own[0], own[3]));
+    const Block own = set.solver().compliance(i, i);
+    const contact::Contact& c = set.solver().contact(i);
+    const Vector2 t = tangent_at(beam_.theta_rad(i));
+    const double axial_n = t[0] * c.force_n[0] + t[1] * c.force_n[1];
+    double law_n = std::max({0.0, axial_n - target[i].upper_n, target[i].lower_n - axial_n});
+    if (c.state == contact::State::SlipForward) law_n = std::abs(axial_n - target[i].upper_n);
+    if (c.state == contact::State::SlipBackward) law_n = std::abs(axial_n - target[i].lower_n);
+    worst_n = std::max({worst_n, std::hypot(r[0] - x[0] - u[0], r[1] - x[1] - u[1]) / std::min(own[0], own[3]), law_n});
   }
   return worst_n;
 }
 
-Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet& set, std::span<contact::Target> target) noexcept {
+// One Newton step of the whole, with the present K and B.
+bool Flexible::iterate(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept {
   const std::size_t n = set.size();
   contact::Solver& tissue = set.solver();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector2 p = beam_.position_m(i);
+    const Vector2 c = beam_.correction_m(i);
+    const Vector2 t = tangent_at(beam_.theta_rad(i));
+    const double moved_m = anchor_m_[i] - load_[i].arclength_m;
+    const Vector2& x = set.point(i).material_m;
+    const Vector2 u = tissue.displacement_m(i);
+    const Vector2 both = joined_.displacement_m(i);  // (G + B) f
+    target[i].tangent = t;
+    for (std::size_t k = 0; k < 2; ++k) target[i].gap_m[k] = p[k] + c[k] + moved_m * t[k] - x[k] + (both[k] - u[k]);
+  }
+  const contact::Solution solution = joined_.solve(target.first(n));
+  outcome.pivots += solution.pivots;
+  outcome.solves += solution.iterations;
+  outcome.contacts = solution.status;
+  if (solution.status == contact::SolverStatus::NotFinite) return false;
+  for (std::size_t i = 0; i < n; ++i) contact_[i] = joined_.contact(i);
+  tissue.assume({contact_.data(), n});
+  take(set);
+  if (beam_.apply({load_.data(), n}).status != needle::Status::Ok) return false;
+  outcome.residual_n = std::max(residual_n(set, target), solution.residual_n);
+  return true;
+}
+
+bool Flexible::converge(needle::Tangent tangent, int most, contact::WorkingSet& set, std::span<contact::Target> target,
+                        Outcome& outcome) noexcept {
+  bool fresh = linearise(tangent, set);
+  if (!fresh) return false;
+  double last_n = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < most; ++k) {
+    ++outcome.iterations;
+    if (!iterate(set, target, outcome)) return false;
+    if (outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm) return true;
+    if (outcome.residual_n * gain > last_n) {
+      if (!linearise(tangent, set)) return false;
+    } else {
+      beam_.correct();
+    }
+    last_n = outcome.residual_n;
+  }
+  return false;
+}
+
+Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet& set, std::span<contact::Target> target) noexcept {
+  const std::size_t n = set.size();
   Outcome outcome;
   beam_.keep();
   for (std::size_t i = 0; i < n; ++i) {
-    before_[i] = tissue.contact(i);
+    before_[i] = set.solver().contact(i);
     anchor_m_[i] = set.point(i).arclength_m;
-    load_[i] = {.arclength_m = anchor_m_[i] - (before_[i].state == contact::State::Stuck ? 0.0 : before_[i].slip_m)};
   }
-  place(base, set);
-  while (outcome.iterations < max_iterations) {
-    ++outcome.iterations;
-    needle::Factor factor = beam_.linearise();
-    if (factor.status == needle::Status::Ok && (factor.negative_pivots > 0 || factor.singular))
-      factor = beam_.linearise(needle::Tangent::Convex);
-    if (factor.status != needle::Status::Ok) break;
-    joined_.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector2 p = beam_.position_m(i);
-      const Vector2 c = beam_.correction_m(i);
-      const double theta = beam_.theta_rad(i);
-      const Vector2 t{std::cos(theta), std::sin(theta)};
-      const double moved_m = anchor_m_[i] - load_[i].arclength_m;
-      const Vector2& x = set.point(i).material_m;
-      Vector2 gap{p[0] + c[0] + moved_m * t[0] - x[0], p[1] + c[1] + moved_m * t[1] - x[1]};
-      for (std::size_t j = 0; j < n; ++j) {
-        const Block& b = beam_.compliance(i, j);
-        const Vector2& f = tissue.contact(j).force_n;
-        gap[0] += b[0] * f[0] + b[1] * f[1];
-        gap[1] += b[2] * f[0] + b[3] * f[1];
-        if (j > i) continue;
-        const Block g = tissue.compliance(i, j);
-        for (std::size_t k = 0; k < 4; ++k) row_[j][k] = g[k] + b[k];
-      }
-      target[i].tangent = t;
-      target[i].gap_m = gap;
-      joined_.push({row_.data(), i + 1}, tissue.contact(i));
-    }
-    const contact::Solution solution = joined_.solve(target.first(n));
-    outcome.pivots += solution.pivots;
-    outcome.solves += solution.iterations;
-    outcome.contacts = solution.status;
-    if (solution.status == contact::SolverStatus::NotFinite) break;
-    std::array<Vector2, capacity::contacts> on_needle;
-    for (std::size_t i = 0; i < n; ++i) {
-      contact_[i] = joined_.contact(i);
-      on_needle[i] = {-contact_[i].force_n[0], -contact_[i].force_n[1]};
-    }
-    if (beam_.apply({on_needle.data(), n}).status != needle::Status::Ok) break;
-    tissue.assume({contact_.data(), n});
-    bool moved = false;
-    for (std::size_t i = 0; i < n; ++i) {
-      const double now = anchor_m_[i] - (contact_[i].state == contact::State::Stuck ? 0.0 : contact_[i].slip_m);
-      moved = moved || now != load_[i].arclength_m;
-      load_[i].arclength_m = now;
-    }
-    if (moved) place(base, set);
-    outcome.residual_n = std::max(gap_n(set), solution.residual_n);
-    if (outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm) {
-      outcome.converged = true;
-      for (std::size_t i = 0; i < n; ++i) set.point(i).arclength_m = load_[i].arclength_m;
-      return outcome;
-    }
+  start(base, set);
+  outcome.converged = converge(needle::Tangent::Exact, exact_iterations, set, target, outcome) && joined_.negative_pivots() == beam_negative_;
+  if (!outcome.converged) {
+    start(base, set);
+    outcome.converged = converge(needle::Tangent::Convex, max_iterations - outcome.iterations, set, target, outcome);
   }
-  // The last converged tick, carried on: same bend on the new base, same forces.
-  tissue.assume({before_.data(), n});
-  for (std::size_t i = 0; i < n; ++i) load_[i].arclength_m = anchor_m_[i];
-  beam_.restore();
-  place(base, set);
+  if (outcome.converged) {
+    for (std::size_t i = 0; i < n; ++i) set.point(i).arclength_m = load_[i].arclength_m;
+    return outcome;
+  }
+  // The last converged tick, carried on: same bend on the new base, same forces, no slip.
+  for (std::size_t i = 0; i < n; ++i) before_[i].slip_m = 0.0;
+  start(base, set);
   return outcome;
 }
 

@@ -4,9 +4,12 @@
 //   arclengths s_i, r_i(f) = p_i + c_i - sum_j B_ij (f_j - f_j placed)  (needle/beam.hpp: the Schur complement of K on the contacts).
 //   What ties them, in the frame of the bent shaft at s_i with the anchor a_i:  u_i = r_i + (a_i - s_i) t_i - X_i  across the shaft, and
 //   along it with stick and slip. So contact/solver.hpp solves it, with G + B for G. A contact that slips by ds is at a_i - ds: the loads
-//   move there, and the next iteration starts from there. It ends when tissue and shaft meet at every contact and the beam is in
-//   equilibrium, measured afterwards with u and r, not with the step.
+//   move there, and the next iteration starts from there. It ends when tissue and shaft meet at every contact, the forces obey friction in
+//   the frame of the shaft as it now stands, and the beam is in equilibrium: measured afterwards, not with the step.
 //   Warm start: the last tick's bend, forces, states and slips.
+//   Chord method: K, B and the factor of G + B serve until an iteration gains less than a factor of `gain`; then they are made anew.
+//   Under thrust beyond buckling K and B are indefinite and the tissue holds the needle; what is found is stable where G + B has as many
+//   negative eigenvalues as K (Haynsworth). Where Newton does not arrive so, it starts again from the last tick with the convex part of K.
 #pragma once
 
 #include <array>
@@ -22,7 +25,9 @@ namespace trocar::insertion {
 
 class Flexible {
  public:
-  static constexpr int max_iterations = 12;    // of Newton
+  static constexpr int max_iterations = 16;    // of Newton
+  static constexpr int exact_iterations = 8;   // after which, or when they arrive at no stable state, the convex tangent is tried
+  static constexpr double gain = 10.0;
   static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
   static constexpr double beam_tolerance_nm = 1e-11;
 
@@ -48,15 +53,19 @@ class Flexible {
   [[nodiscard]] double arclength_m(const contact::Vector2& x_m, double near_m) const noexcept;
 
  private:
-  void place(const needle::Pose& base, const contact::WorkingSet& set) noexcept;
-  [[nodiscard]] double gap_n(const contact::WorkingSet& set) const noexcept;
+  void start(const needle::Pose& base, contact::WorkingSet& set) noexcept;
+  bool linearise(needle::Tangent tangent, const contact::WorkingSet& set) noexcept;
+  bool iterate(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
+  bool converge(needle::Tangent tangent, int most, contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
+  void take(const contact::WorkingSet& set) noexcept;
+  [[nodiscard]] double residual_n(const contact::WorkingSet& set, std::span<const contact::Target> target) const noexcept;
 
   needle::Beam beam_{};
   contact::Solver joined_{};  // G + B
+  int beam_negative_{};       // negative eigenvalues of K
   std::array<needle::Load, capacity::contacts> load_{};
   std::array<double, capacity::contacts> anchor_m_{};
   std::array<contact::Contact, capacity::contacts> contact_{}, before_{};
-  std::array<contact::Block, capacity::contacts> row_{};
 };
 
 }  // namespace trocar::insertion

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/needle/directions.hpp"
+
 namespace trocar::needle {
 namespace {
 
@@ -158,6 +160,11 @@ bool Beam::assemble() noexcept {
   base_tangent_ = direction(base_.theta_rad);
   tip_tangent_ = direction(base_.theta_rad + bend_[nodes_ - 1]);
   Vector2 at_m{base_.x_m, base_.y_m};
+  std::size_t g = 0;
+  for (std::size_t v = 0; v < intervals_; ++v)
+    for (const Point& point : interval_[v].point) angle_[g++] = base_.theta_rad + bend_at(interval_[v].element, point.shape);
+  directions(angle_.data(), cosine_.data(), sine_.data(), g);
+  g = 0;
   for (std::size_t v = 0; v < intervals_; ++v) {
     Interval& interval = interval_[v];
     interval.start_m = at_m;
@@ -165,7 +172,8 @@ bool Beam::assemble() noexcept {
     interval.axial = {};
     double* const r = &r_[2 * interval.element];
     for (Point& point : interval.point) {
-      const Vector2 t = direction(base_.theta_rad + bend_at(interval.element, point.shape));
+      const Vector2 t{cosine_[g], sine_[g]};
+      ++g;
       const double along = dot(interval.force_n, t);
       const double across = dot(interval.force_n, normal(t));
       const double stretch = 1.0 + along * inverse_axial;
@@ -217,24 +225,29 @@ bool Beam::assemble() noexcept {
          finite(clamp_n_);
 }
 
+bool Beam::known(std::span<const Load> loads) noexcept {
+  bool all = true;
+  for (const Load& load : loads) all = all && std::isfinite(load.arclength_m) && finite(load.force_n) && std::isfinite(load.moment_nm);
+  return all;
+}
+
 Result Beam::place(const Pose& base, std::span<const Load> loads) noexcept {
   if (!open_) return {Status::NotOpen};
   if (loads.size() > most_loads) return {Status::CapacityReached};
-  bool known = std::isfinite(base.x_m) && std::isfinite(base.y_m) && std::isfinite(base.theta_rad);
-  for (const Load& load : loads) known = known && std::isfinite(load.arclength_m) && finite(load.force_n) && std::isfinite(load.moment_nm);
-  if (!known) return {Status::NotFinite};
+  if (!std::isfinite(base.x_m) || !std::isfinite(base.y_m) || !std::isfinite(base.theta_rad) || !known(loads)) return {Status::NotFinite};
   linear_ = false;
   base_ = base;
+  if (lay_out(loads)) return {Status::Ok, 0, residual_nm_};
+  // Forces so large that they overflow: without them there is always a state.
+  (void)lay_out({});
+  return {Status::NotFinite};
+}
+
+bool Beam::lay_out(std::span<const Load> loads) noexcept {
   rank(loads);
   cut();
   share_out();
-  if (assemble()) return {Status::Ok, 0, residual_nm_};
-  // Forces so large that they overflow: without them there is always a state.
-  count_ = 0;
-  cut();
-  share_out();
-  (void)assemble();
-  return {Status::NotFinite};
+  return assemble();
 }
 
 // K = L D L^T by rows.

@@ -117,11 +117,14 @@ class Beam {
   //   place      the present bend on this base under these loads, which need not be in equilibrium; R, positions, wrench follow
   //   linearise  r_i(f) = position_m(i) + correction_m(i) + sum_j compliance(i, j) (f_j - f_j placed): where the beam's own Newton step
   //              under forces f takes point i. Valid until the next place, solve or apply.
-  //   apply      takes that step for the f that the caller chose, shortened to longest_step_rad, and places again under f.
-  // Points keep the order of the loads. apply returns R at the new place; refused forces leave the last place.
+  //   apply      takes that step for the f that the caller chose, shortened to longest_step_rad, and places again under f, at arclengths
+  //              that may have moved meanwhile. As many loads as were placed.
+  //   correct    instead of linearise after an apply: the beam's own step anew, from the K and P of the last linearise (chord method).
+  // Points keep the order of the loads. apply returns R at the new place; refused loads leave the last place.
   Result place(const Pose& base, std::span<const Load> loads) noexcept;
   Factor linearise(Tangent tangent = Tangent::Exact) noexcept;
-  Result apply(std::span<const Vector2> force_n) noexcept;
+  void correct() noexcept;  // precondition: linearise, then as many loads
+  Result apply(std::span<const Load> loads) noexcept;
 
   // After solve, place or apply.
   [[nodiscard]] std::size_t loads() const noexcept { return count_; }
@@ -137,8 +140,13 @@ class Beam {
   [[nodiscard]] std::size_t nodes() const noexcept { return nodes_; }
   [[nodiscard]] double node_arclength_m(std::size_t k) const noexcept;
 
-  // After linearise.
-  [[nodiscard]] const Block& compliance(std::size_t i, std::size_t j) const noexcept { return block_[i * most_loads + j]; }  // m/N
+  // After linearise; the first and correction_m after correct too.
+  [[nodiscard]] Block compliance(std::size_t i, std::size_t j) const noexcept {  // m/N
+    const double* const x = &flexibility_[4 * most_loads * j];
+    return {x[i], x[2 * most_loads + i], x[most_loads + i], x[3 * most_loads + i]};
+  }
+  // The same in columns: of force x and of force y at load 0, at load 1, …: displacements x of most_loads loads, then y.
+  [[nodiscard]] std::span<const double> flexibility() const noexcept { return flexibility_; }
   [[nodiscard]] Vector2 correction_m(std::size_t i) const noexcept { return correction_[i]; }
   [[nodiscard]] Vector2 by_base_angle(std::size_t i) const noexcept { return by_base_[i]; }  // dr_i/dtheta of the base, m/rad
   [[nodiscard]] Vector2 rotation(std::size_t i, std::size_t j) const noexcept;               // dtheta(s_i)/df_j, rad/N
@@ -180,6 +188,7 @@ class Beam {
     double overhang_m{};  // beyond the tip (> 0) or before the base (< 0)
   };
 
+  [[nodiscard]] static bool known(std::span<const Load> loads) noexcept;  // finite
   [[nodiscard]] double element_m() const noexcept { return properties_.length_m / static_cast<double>(properties_.elements); }
   [[nodiscard]] Shape shape_at(std::size_t element, double arclength_m) const noexcept;
   [[nodiscard]] double bend_at(std::size_t element, const Shape& shape) const noexcept;
@@ -187,6 +196,7 @@ class Beam {
   void cut() noexcept;
   void share_out() noexcept;
   bool assemble() noexcept;
+  bool lay_out(std::span<const Load> loads) noexcept;  // all of the above
   Factor factorise(Tangent tangent) noexcept;
   void newton_step(std::span<double> step) const noexcept;
   void negative_curvature(std::span<double> direction) const noexcept;
@@ -197,7 +207,7 @@ class Beam {
 
   Properties properties_{};
   bool open_{false};
-  bool linear_{false};  // what linearise leaves is of the present place
+  bool linear_{false};  // what linearise or correct leaves is of the present place
   std::size_t nodes_{0};
   std::size_t count_{0};  // loads
   std::size_t intervals_{0};
@@ -218,9 +228,11 @@ class Beam {
   std::array<Ranked, most_loads> ranked_{};
   std::array<std::uint16_t, most_loads> rank_{};   // of load i
   std::array<std::uint16_t, most_loads> owner_{};  // load of a rank
+  std::array<std::uint16_t, most_loads> column_of_{};  // of load i: its rank at the last linearise
   std::array<Vector2, most_loads> position_{};     // by rank
   std::array<Interval, most_intervals> interval_{};
-  std::array<Block, most_loads * most_loads> block_{};
+  alignas(64) std::array<double, gauss_points * most_intervals> angle_{}, cosine_{}, sine_{};  // of the integration points
+  alignas(64) std::array<double, 4 * most_loads * most_loads> flexibility_{};
   std::array<Vector2, most_loads> correction_{}, by_base_{};
   // K^-1 P, node by node, 2 block_columns_ each.
   alignas(64) std::array<double, most_nodes * most_columns> column_{};

@@ -81,12 +81,18 @@ void Beam::solve_columns() noexcept {
 // and mirrored: B is symmetric to the bit.
 void Beam::emit(std::size_t i, std::span<const double> x, std::span<const double> y, const std::array<double, 3>& axial) noexcept {
   const std::size_t owner = owner_[i];
+  const auto put = [&](std::size_t at, std::size_t by, double xx, double xy, double yx, double yy) {
+    double* const column = &flexibility_[4 * most_loads * by];
+    column[at] = xx;
+    column[most_loads + at] = yx;
+    column[2 * most_loads + at] = xy;
+    column[3 * most_loads + at] = yy;
+  };
   for (std::size_t j = i; j < count_; ++j) {
-    const double xy = x[block_columns_ + j] + axial[1];
+    const double xx = x[j] + axial[0], xy = x[block_columns_ + j] + axial[1], yy = y[block_columns_ + j] + axial[2];
     const double yx = j == i ? xy : y[j] + axial[1];
-    const Block block{x[j] + axial[0], xy, yx, y[block_columns_ + j] + axial[2]};
-    block_[owner * most_loads + owner_[j]] = block;
-    block_[owner_[j] * most_loads + owner] = {block[0], block[2], block[1], block[3]};
+    put(owner, owner_[j], xx, xy, yx, yy);
+    put(owner_[j], owner, xx, yx, xy, yy);
   }
   correction_[owner] = {x[count_], y[count_]};
   by_base_[owner] = {x[block_columns_ + count_], y[block_columns_ + count_]};
@@ -149,6 +155,7 @@ Factor Beam::linearise(Tangent tangent) noexcept {
   const Factor factor = factorise(tangent);
   if (factor.status != Status::Ok) return factor;
   block_columns_ = (count_ + lanes) / lanes * lanes;
+  column_of_ = rank_;
   fill_levers();
   solve_columns();
   integrate_columns();
@@ -156,11 +163,32 @@ Factor Beam::linearise(Tangent tangent) noexcept {
   return factor;
 }
 
-Result Beam::apply(std::span<const Vector2> force_n) noexcept {
+// K z = -R, and r_i along z by integrating the levers up to each load.
+void Beam::correct() noexcept {
+  const std::size_t stride = 2 * block_columns_;
+  std::array<double, most_nodes> z{};
+  newton_step({z.data(), nodes_});
+  for (std::size_t k = 1; k < nodes_; ++k) column_[k * stride + count_] = z[k];
+  Vector2 moved{};
+  std::size_t i = 0;
+  for (; i < count_ && ranked_[i].after == 0; ++i) correction_[owner_[i]] = {};
+  for (std::size_t v = 0; v < intervals_ && i < count_; ++v) {
+    const Interval& interval = interval_[v];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double turned = z[2 * interval.element + a];
+      moved = {moved[0] + turned * interval.lever[a][0], moved[1] + turned * interval.lever[a][1]};
+    }
+    for (; i < count_ && ranked_[i].after == v + 1; ++i) {
+      const double swing = ranked_[i].overhang_m * z[nodes_ - 1];
+      correction_[owner_[i]] = {moved[0] - swing * tip_tangent_[1], moved[1] + swing * tip_tangent_[0]};
+    }
+  }
+  linear_ = true;
+}
+
+Result Beam::apply(std::span<const Load> loads) noexcept {
   if (!open_) return {Status::NotOpen};
-  bool known = force_n.size() == count_;
-  for (const Vector2& force : force_n) known = known && std::isfinite(force[0]) && std::isfinite(force[1]);
-  if (!known) return {Status::NotFinite, 0, residual_nm_};
+  if (loads.size() != count_ || !known(loads)) return {Status::NotFinite, 0, residual_nm_};
   if (!linear_) {
     if (const Factor factor = linearise(); factor.status != Status::Ok) return {factor.status, 0, residual_nm_};
   }
@@ -168,9 +196,9 @@ Result Beam::apply(std::span<const Vector2> force_n) noexcept {
   const std::size_t stride = 2 * block_columns_;
   alignas(64) std::array<double, most_columns> change{};
   for (std::size_t j = 0; j < count_; ++j) {
-    const Vector2& placed = ranked_[j].load.force_n;
-    change[j] = force_n[owner_[j]][0] - placed[0];
-    change[block_columns_ + j] = force_n[owner_[j]][1] - placed[1];
+    const Vector2& placed = ranked_[rank_[j]].load.force_n;
+    change[column_of_[j]] = loads[j].force_n[0] - placed[0];
+    change[block_columns_ + column_of_[j]] = loads[j].force_n[1] - placed[1];
   }
   change[count_] = 1.0;
   std::array<double, most_nodes> step{};
@@ -187,26 +215,20 @@ Result Beam::apply(std::span<const Vector2> force_n) noexcept {
   }
   if (!std::isfinite(sum)) return {Status::NotFinite, 0, residual_nm_};
   const std::array<double, most_nodes> before = bend_;
+  std::array<Load, most_loads> placed{};
+  for (std::size_t j = 0; j < count_; ++j) placed[j] = ranked_[rank_[j]].load;
   const double part = largest > longest_step_rad ? longest_step_rad / largest : 1.0;
   for (std::size_t k = 1; k < nodes_; ++k) bend_[k] += part * step[k];
-  std::array<Vector2, most_loads> placed{};
-  for (std::size_t j = 0; j < count_; ++j) {
-    placed[j] = ranked_[j].load.force_n;
-    ranked_[j].load.force_n = force_n[owner_[j]];
-  }
-  share_out();
-  if (assemble()) return {Status::Ok, 1, residual_nm_};
+  if (lay_out(loads)) return {Status::Ok, 1, residual_nm_};
   bend_ = before;
-  for (std::size_t j = 0; j < count_; ++j) ranked_[j].load.force_n = placed[j];
-  share_out();
-  (void)assemble();
+  (void)lay_out({placed.data(), count_});
   return {Status::NotFinite, 0, residual_nm_};
 }
 
 Vector2 Beam::rotation(std::size_t i, std::size_t j) const noexcept {
   const Ranked& at = ranked_[rank_[i]];
   const std::size_t stride = 2 * block_columns_;
-  const double* const z = &column_[2 * at.element * stride + rank_[j]];
+  const double* const z = &column_[2 * at.element * stride + column_of_[j]];
   Vector2 turned{};
   for (std::size_t a = 0; a < 3; ++a)
     turned = {turned[0] + at.shape[a] * z[a * stride], turned[1] + at.shape[a] * z[a * stride + block_columns_]};
@@ -214,7 +236,7 @@ Vector2 Beam::rotation(std::size_t i, std::size_t j) const noexcept {
 }
 
 Vector2 Beam::tip_rotation(std::size_t j) const noexcept {
-  const double* const z = &column_[(nodes_ - 1) * 2 * block_columns_ + rank_[j]];
+  const double* const z = &column_[(nodes_ - 1) * 2 * block_columns_ + column_of_[j]];
   return {z[0], z[block_columns_]};
 }
 

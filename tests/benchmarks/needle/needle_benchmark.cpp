@@ -86,7 +86,7 @@ void Bench::parts_of_a_tick() {
   auto beam = std::make_unique<needle::Beam>();
   if (beam->open({length, bending, axial, 0.0, 24}) != needle::Status::Ok) throw std::runtime_error("a beam cannot be opened");
   std::vector<needle::Load> loads(points);
-  std::vector<needle::Vector2> force(points);
+  std::vector<needle::Load> pulled(points);
   long tick = 0;
   needle::Pose base;
   const auto next = [&] {
@@ -95,7 +95,8 @@ void Bench::parts_of_a_tick() {
     for (std::size_t i = 0; i < points; ++i) {
       const double s = length * (0.3 + 0.7 * (static_cast<double>(i) + 0.5 + 0.3 * std::sin(phase)) / static_cast<double>(points));
       loads[i] = {s, {0.05 * std::cos(0.3 * static_cast<double>(i) + phase), -0.02}, 0.0};
-      force[i] = {loads[i].force_n[0] + 1e-3 * std::sin(3.0 * phase), loads[i].force_n[1]};
+      pulled[i] = loads[i];
+      pulled[i].force_n[0] += 1e-3 * std::sin(3.0 * phase);
     }
   };
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Random(2 * points, 2 * points);
@@ -123,7 +124,7 @@ void Bench::parts_of_a_tick() {
                            next();
                            sink += beam->place(base, loads).residual_nm;
                            sink += beam->linearise().negative_pivots;
-                           return timed([&] { sink += beam->apply(force).residual_nm; });
+                           return timed([&] { sink += beam->apply(pulled).residual_nm; });
                          }},
                         {"solve: equilibrium under given forces, from the last tick's", [&] {
                            next();

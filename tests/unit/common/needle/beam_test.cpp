@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "common/needle/directions.hpp"
 #include "elastica.hpp"
 
 namespace trocar::needle {
@@ -241,8 +242,8 @@ TEST(Beam, RefusesWhatIsNotFiniteAndKeepsItsShape) {
     }
     for (const Pose& pose : {Pose{bad, 0.0, 0.0}, Pose{0.0, bad, 0.0}, Pose{0.0, 0.0, bad}})
       EXPECT_EQ(beam->solve(pose, good).status, Status::NotFinite);
-    const std::vector<Vector2> force{{bad, 0.0}};
-    EXPECT_EQ(beam->apply(force).status, Status::NotFinite);
+    const std::vector<Load> pulled{{length, {bad, 0.0}, 0.0}};
+    EXPECT_EQ(beam->apply(pulled).status, Status::NotFinite);
     EXPECT_EQ(beam->tip().position_m, tip);
     Beam* const unusable = beam_of({length, bending, axial, 0.0, 24}).release();
     EXPECT_EQ(unusable->open({length, bad, axial, 0.0, 24}), Status::NotOpen);
@@ -295,6 +296,28 @@ TEST(Beam, FindsAStableEquilibriumUnderRandomLoads) {
   // All of them, with this seed, in at most 32 iterations.
   EXPECT_GT(solved, cases * 99 / 100);
   EXPECT_LT(most, 60);
+}
+
+TEST(Directions, AreTheLibrarysCosinesAndSines) {
+  std::mt19937_64 random(3);
+  for (const double range : {1e-3, 1.0, 100.0, 0.999e5, 1e9}) {
+    std::uniform_real_distribution<double> angle(-range, range);
+    std::vector<double> a(1003), c(1003), s(1003);
+    for (double& value : a) value = angle(random);
+    a[0] = 0.0;
+    a[1] = std::min(range, std::numbers::pi / 4);
+    directions(a.data(), c.data(), s.data(), a.size());
+    EXPECT_EQ(c[0], 1.0);
+    EXPECT_EQ(s[0], 0.0);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_NEAR(c[i], std::cos(a[i]), 3e-16) << a[i];
+      EXPECT_NEAR(s[i], std::sin(a[i]), 3e-16) << a[i];
+    }
+  }
+  const double a = std::numeric_limits<double>::quiet_NaN();
+  double c = 0.0, s = 0.0;
+  directions(&a, &c, &s, 1);
+  EXPECT_TRUE(std::isnan(c) && std::isnan(s));
 }
 
 }  // namespace

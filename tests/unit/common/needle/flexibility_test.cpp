@@ -135,9 +135,9 @@ TEST(Flexibility, PredictsTheStepItTakes) {
       const std::vector<Vector2> change{{size, size}, {0.0, -2.0 * size}, {0.5 * size, size}, {size, -size}};
       EXPECT_EQ(beam->linearise().negative_pivots > 0, thrust > 0.0);
       std::vector<Vector2> expected(4);
-      std::vector<Vector2> force(4);
+      std::vector<Load> changed = loads;
       for (std::size_t i = 0; i < 4; ++i) {
-        force[i] = {loads[i].force_n[0] + change[i][0], loads[i].force_n[1] + change[i][1]};
+        changed[i].force_n = {loads[i].force_n[0] + change[i][0], loads[i].force_n[1] + change[i][1]};
         expected[i] = {beam->position_m(i)[0] + beam->correction_m(i)[0], beam->position_m(i)[1] + beam->correction_m(i)[1]};
         for (std::size_t j = 0; j < 4; ++j) {
           const Block b = beam->compliance(i, j);
@@ -145,7 +145,7 @@ TEST(Flexibility, PredictsTheStepItTakes) {
           expected[i] = {expected[i][0] + b[0] * d[0] + b[1] * d[1], expected[i][1] + b[2] * d[0] + b[3] * d[1]};
         }
       }
-      EXPECT_EQ(beam->apply(force).status, Status::Ok);
+      EXPECT_EQ(beam->apply(changed).status, Status::Ok);
       double worst = 0.0;
       for (std::size_t i = 0; i < 4; ++i)
         worst = std::max(worst, std::hypot(beam->position_m(i)[0] - expected[i][0], beam->position_m(i)[1] - expected[i][1]));
@@ -158,16 +158,13 @@ TEST(Flexibility, PredictsTheStepItTakes) {
 
 TEST(Flexibility, NewtonByHandConvergesWithTheSquare) {
   const std::vector<Load> loads = some_loads();
-  std::vector<Vector2> force;
-  force.reserve(loads.size());
-  for (const Load& load : loads) force.push_back(load.force_n);
   const auto exact = solved(base, loads);
   auto beam = std::make_unique<Beam>();
   ASSERT_EQ(beam->open(properties), Status::Ok);
   std::vector<double> residual{beam->place(base, loads).residual_nm};
   for (int k = 0; k < 7; ++k) {
     EXPECT_EQ(beam->linearise().status, Status::Ok);
-    residual.push_back(beam->apply(force).residual_nm);
+    residual.push_back(beam->apply(loads).residual_nm);
   }
   EXPECT_LT(residual.back(), 1e-13);
   // Each residual at most a constant times the last one's square, until rounding.
@@ -176,6 +173,31 @@ TEST(Flexibility, NewtonByHandConvergesWithTheSquare) {
       EXPECT_LT(residual[k + 1], 100.0 * residual[k] * residual[k]) << k;
     }
   for (std::size_t i = 0; i < loads.size(); ++i) EXPECT_NEAR(beam->position_m(i)[0], exact->position_m(i)[0], 1e-12);
+}
+
+// The chord method: with K and P of another place its own step still ends in the equilibrium, loads that move and change order included.
+TEST(Flexibility, CorrectsWithTheFactorOfAnotherPlace) {
+  std::vector<Load> loads = some_loads();
+  auto beam = solved(base, loads);
+  ASSERT_EQ(beam->linearise().status, Status::Ok);
+  for (std::size_t i = 0; i < loads.size(); ++i) loads[i].arclength_m += i % 2 == 0 ? 2e-3 : -1e-3;
+  loads[1].force_n[1] += 0.01;
+  const auto exact = solved(base, loads);
+  ASSERT_EQ(beam->apply(loads).status, Status::Ok);
+  double last = beam->residual_nm();
+  EXPECT_GT(last, 1e-6);
+  for (int k = 0; k < 30 && last > 1e-13; ++k) {
+    beam->correct();
+    const Vector2 expected{beam->position_m(1)[0] + beam->correction_m(1)[0], beam->position_m(1)[1] + beam->correction_m(1)[1]};
+    ASSERT_EQ(beam->apply(loads).status, Status::Ok);
+    EXPECT_LT(std::hypot(beam->position_m(1)[0] - expected[0], beam->position_m(1)[1] - expected[1]), 10.0 * last) << k;
+    EXPECT_LT(beam->residual_nm(), std::max(0.3 * last, 1e-13)) << k;
+    last = beam->residual_nm();
+  }
+  for (std::size_t i = 0; i < loads.size(); ++i) {
+    EXPECT_NEAR(beam->position_m(i)[0], exact->position_m(i)[0], 1e-12);
+    EXPECT_NEAR(beam->position_m(i)[1], exact->position_m(i)[1], 1e-12);
+  }
 }
 
 }  // namespace
