@@ -135,7 +135,8 @@ Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet&
     anchor_m_[i] = set.point(i).arclength_m;
   }
   start(base, set);
-  outcome.converged = converge(needle::Tangent::Exact, exact_iterations, set, target, outcome) && joined_.negative_pivots() == beam_negative_;
+  outcome.converged =
+      converge(needle::Tangent::Exact, exact_iterations, set, target, outcome) && joined_.negative_pivots() == beam_negative_;
   if (!outcome.converged) {
     start(base, set);
     outcome.converged = converge(needle::Tangent::Convex, max_iterations - outcome.iterations, set, target, outcome);

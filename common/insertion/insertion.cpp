@@ -193,6 +193,14 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   return result_ = result;
 }
 
+bool Insertion::jacobian(Jacobian& out) noexcept {
+  if (!started_ || result_.status != Status::Ok) return false;
+  if (bends_) return flexible_.jacobian(pose_, set_, out);
+  const double needle_m = image_->needle.length_m;
+  out = {{{1.0, 0.0, -needle_m * axis_[1]}, {0.0, 1.0, needle_m * axis_[0]}, {0.0, 0.0, 1.0}}};
+  return true;
+}
+
 void Insertion::take_tip() noexcept {
   if (bends_) {
     const needle::Station tip = flexible_.beam().tip();

@@ -68,6 +68,10 @@ class Insertion {
   // dt_s since the last step serves the speed alone; ignored in the first step.
   Result step(const Pose& base, double dt_s) noexcept;
 
+  // Needle manipulation Jacobian of the last step, if that was Ok: see Flexible::jacobian. It holds for motion that goes on as it did;
+  // where contacts that slip would stick, at a reversal, the derivative is another one. Not for every tick.
+  bool jacobian(Jacobian& out) noexcept;
+
   struct ContactReport {
     Vector2 position_m{};  // deformed
     double arclength_m{};

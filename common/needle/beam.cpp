@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/needle/directions.hpp"
+#include "common/needle/plane.hpp"
 
 namespace trocar::needle {
 namespace {
@@ -16,9 +17,6 @@ constexpr std::array gauss_weight{5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
 // 3 h / EI times the bending stiffness of an element.
 constexpr std::array<std::array<double, 3>, 3> element_bending{{{7.0, -8.0, 1.0}, {-8.0, 16.0, -8.0}, {1.0, -8.0, 7.0}}};
 
-double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
-Vector2 normal(const Vector2& t) noexcept { return {-t[1], t[0]}; }
-Vector2 direction(double theta_rad) noexcept { return {std::cos(theta_rad), std::sin(theta_rad)}; }
 bool positive(double value) noexcept { return std::isfinite(value) && value > 0.0; }
 bool finite(const Vector2& v) noexcept { return std::isfinite(v[0]) && std::isfinite(v[1]); }
 
@@ -306,8 +304,14 @@ Factor Beam::factorise(Tangent tangent) noexcept {
 
 // step = -K^-1 R, with 0 at the clamp.
 void Beam::newton_step(std::span<double> step) const noexcept {
+  for (std::size_t i = 1; i < nodes_; ++i) step[i] = -r_[i];
+  back_substitute(step);
+}
+
+// K^-1 in place, with 0 at the clamp.
+void Beam::back_substitute(std::span<double> step) const noexcept {
   step[0] = 0.0;
-  for (std::size_t i = 1; i < nodes_; ++i) step[i] = -r_[i] - first_[i] * step[i - 1] - (i > 1 ? second_[i] * step[i - 2] : 0.0);
+  for (std::size_t i = 1; i < nodes_; ++i) step[i] -= first_[i] * step[i - 1] + (i > 1 ? second_[i] * step[i - 2] : 0.0);
   for (std::size_t i = nodes_ - 1; i > 0; --i) {
     step[i] /= diagonal_[i];
     if (i + 1 < nodes_) step[i] -= first_[i + 1] * step[i + 1];
@@ -431,6 +435,9 @@ Station Beam::at(double arclength_m) const noexcept {
   station.theta_rad = base_.theta_rad + bend_at(interval.element, shape_at(interval.element, arclength_m));
   station.tangent = direction(station.theta_rad);
   station.stretch = 1.0 + dot(interval.force_n, station.tangent) / properties_.axial_n;
+  const double xi = (arclength_m - node_arclength_m(2 * interval.element)) / element_m();
+  const double* const b = &bend_[2 * interval.element];
+  station.curvature_per_m = ((4.0 * xi - 3.0) * (b[0] - b[1]) + (4.0 * xi - 1.0) * (b[2] - b[1])) / element_m();
   return station;
 }
 

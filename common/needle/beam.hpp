@@ -92,6 +92,14 @@ struct Station {
   double theta_rad{};
   Vector2 tangent{1.0, 0.0};  // of length 1; the normal is (-tangent[1], tangent[0])
   double stretch{1.0};        // |dr/ds|
+  double curvature_per_m{};   // dtheta/ds; 0 on the rigid continuations
+};
+
+// What a load that moves along the shaft does, per length.
+struct Slide {
+  double moment_nm{};  // on the section where it stands
+  Vector2 own_m{};     // where it stands itself, the bend kept
+  Vector2 beyond_m{};  // everything further from the base, by the stretch that it takes along
 };
 
 class Beam {
@@ -154,6 +162,10 @@ class Beam {
   [[nodiscard]] double rotation_correction(std::size_t i) const noexcept;                    // of theta(s_i) by the beam's own step
   [[nodiscard]] double rotation_by_base_angle(std::size_t i) const noexcept;                 // dtheta(s_i)/dtheta of the base
   [[nodiscard]] double tip_rotation_by_base_angle() const noexcept;
+  // dtheta(s_i)/dM_j for all loads i.
+  void rotations_by_moment(std::size_t j, std::span<double> rotation) const noexcept;
+  [[nodiscard]] Slide slide(std::size_t j) const noexcept;
+  [[nodiscard]] bool beyond(std::size_t i, std::size_t j) const noexcept { return rank_[i] > rank_[j]; }  // load i beyond load j
 
  private:
   static constexpr std::size_t most_nodes = 2 * capacity::needle_elements + 1;
@@ -199,6 +211,7 @@ class Beam {
   bool lay_out(std::span<const Load> loads) noexcept;  // all of the above
   Factor factorise(Tangent tangent) noexcept;
   void newton_step(std::span<double> step) const noexcept;
+  void back_substitute(std::span<double> step) const noexcept;
   void negative_curvature(std::span<double> direction) const noexcept;
   void fill_levers() noexcept;
   void solve_columns() noexcept;
@@ -226,10 +239,10 @@ class Beam {
   std::array<double, most_nodes> diagonal_{}, first_{}, second_{};
   std::array<double, 2> clamped_{};  // K of nodes 1 and 2 with node 0
   std::array<Ranked, most_loads> ranked_{};
-  std::array<std::uint16_t, most_loads> rank_{};   // of load i
-  std::array<std::uint16_t, most_loads> owner_{};  // load of a rank
+  std::array<std::uint16_t, most_loads> rank_{};       // of load i
+  std::array<std::uint16_t, most_loads> owner_{};      // load of a rank
   std::array<std::uint16_t, most_loads> column_of_{};  // of load i: its rank at the last linearise
-  std::array<Vector2, most_loads> position_{};     // by rank
+  std::array<Vector2, most_loads> position_{};         // by rank
   std::array<Interval, most_intervals> interval_{};
   alignas(64) std::array<double, gauss_points * most_intervals> angle_{}, cosine_{}, sine_{};  // of the integration points
   alignas(64) std::array<double, 4 * most_loads * most_loads> flexibility_{};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/needle/beam.hpp"
+#include "common/needle/plane.hpp"
 
 namespace trocar::needle {
 
@@ -252,6 +253,40 @@ double Beam::rotation_by_base_angle(std::size_t i) const noexcept {
   const std::size_t stride = 2 * block_columns_;
   const double* const z = &column_[2 * at.element * stride + block_columns_ + count_];
   return at.shape[0] * z[0] + at.shape[1] * z[stride] + at.shape[2] * z[2 * stride];
+}
+
+void Beam::rotations_by_moment(std::size_t j, std::span<double> rotation) const noexcept {
+  std::array<double, most_nodes> z{};
+  const Ranked& turned = ranked_[rank_[j]];
+  for (std::size_t a = 0; a < 3; ++a) z[2 * turned.element + a] = turned.shape[a];
+  back_substitute({z.data(), nodes_});
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Ranked& at = ranked_[rank_[i]];
+    const double* const seen = &z[2 * at.element];
+    rotation[i] = at.shape[0] * seen[0] + at.shape[1] * seen[1] + at.shape[2] * seen[2];
+  }
+}
+
+// dR/ds_j is the difference of what N does to the bend on either side of the load; it acts where the load stands.
+Slide Beam::slide(std::size_t j) const noexcept {
+  const Ranked& at = ranked_[rank_[j]];
+  const Vector2& f = at.load.force_n;
+  if (at.overhang_m != 0.0 || at.load.arclength_m <= 0.0) {
+    const Vector2& t = at.load.arclength_m > 0.0 ? tip_tangent_ : base_tangent_;
+    return {dot(f, normal(t)), t, {}};
+  }
+  Vector2 beyond{};
+  for (std::size_t k = rank_[j] + std::size_t{1}; k < count_; ++k)
+    beyond = {beyond[0] + ranked_[k].load.force_n[0], beyond[1] + ranked_[k].load.force_n[1]};
+  const Vector2 before{beyond[0] + f[0], beyond[1] + f[1]};
+  const Vector2 t = direction(theta_rad(j));
+  const Vector2 n = normal(t);
+  const double inverse_axial = 1.0 / properties_.axial_n;
+  const double stretch = 1.0 + dot(before, t) * inverse_axial;
+  const double taken = dot(f, t) * inverse_axial;
+  return {dot(before, n) * stretch - dot(beyond, n) * (1.0 + dot(beyond, t) * inverse_axial),
+          {stretch * t[0], stretch * t[1]},
+          {taken * t[0], taken * t[1]}};
 }
 
 double Beam::tip_rotation_by_base_angle() const noexcept { return column_[(nodes_ - 1) * 2 * block_columns_ + block_columns_ + count_]; }

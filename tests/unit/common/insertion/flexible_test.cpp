@@ -1,7 +1,9 @@
 // A needle that bends: against the rigid one in the limit, and by what must hold in every tick.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include "common/needle/tube.hpp"
@@ -154,6 +156,60 @@ TEST(Flexible, NamesATickWithoutEquilibriumAndGoesOn) {
       ASSERT_LE(r.residual_n, Flexible::tolerance_n);
     }
   }
+}
+
+// Against steps from the same state with a perturbed base: those go on as the last step did, so every contact keeps its state. Advancing,
+// where all slip, and a little back, where some stick.
+void expect_the_jacobian_of_the_next_step(fem::Type type, bool back) {
+  Hand hand(grid_of(type));
+  bend(hand);
+  hand.move(0.0, 0.045);
+  hand.move(0.004, 0.012, 0.03);
+  const auto slipping_of = [](const Insertion& model) {
+    int count = 0;
+    for (std::size_t i = 0; i < model.contacts(); ++i) count += model.contact(i).state == contact::State::Stuck ? 0 : 1;
+    return count;
+  };
+  if (back) hand.move(0.0, -1e-4);
+  for (int k = 0; back && k < 100 && slipping_of(hand.model()) < 2; ++k) hand.move(0.0, -1e-4);
+  const std::unique_ptr<Insertion> before = std::make_unique<Insertion>(hand.model());
+  Pose pose = hand.pose;
+  pose.y_m += back ? -5e-5 : 1e-4;
+  pose.x_m += 2e-5;
+  const auto tip_after = [&](double dx, double dy, double turn) {
+    const auto model = std::make_unique<Insertion>(*before);
+    const Result r = model->step({pose.x_m + dx, pose.y_m + dy, pose.theta_rad + turn}, 1e-3);
+    EXPECT_EQ(r.status, Status::Ok);
+    return std::array{r.tip.x_m, r.tip.y_m, r.tip.theta_rad};
+  };
+  const auto model = std::make_unique<Insertion>(*before);
+  ASSERT_EQ(model->step(pose, 1e-3).status, Status::Ok);
+  const int slipping = slipping_of(*model);
+  const int stuck = static_cast<int>(model->contacts()) - slipping;
+  EXPECT_GE(slipping, back ? 2 : 10);
+  EXPECT_EQ(stuck >= 2, back) << stuck;
+  const Wrench reaction = model->beam().reaction();
+  Jacobian jacobian{};
+  ASSERT_TRUE(model->jacobian(jacobian));
+  EXPECT_EQ(model->beam().reaction().tau_nm, reaction.tau_nm);
+  for (std::size_t column = 0; column < 3; ++column) {
+    const double step = column == 2 ? 2e-5 : 2e-6;
+    const auto up = tip_after(column == 0 ? step : 0.0, column == 1 ? step : 0.0, column == 2 ? step : 0.0);
+    const auto down = tip_after(column == 0 ? -step : 0.0, column == 1 ? -step : 0.0, column == 2 ? -step : 0.0);
+    // Of the column's largest entry, lengths in units of 50 mm.
+    double largest = 0.0;
+    for (std::size_t row = 0; row < 3; ++row) largest = std::max(largest, std::abs(jacobian[row][column]) * (row == 2 ? 0.05 : 1.0));
+    for (std::size_t row = 0; row < 3; ++row)
+      EXPECT_NEAR((up[row] - down[row]) / (2.0 * step), jacobian[row][column], 1e-6 * largest * (row == 2 ? 20.0 : 1.0))
+          << row << column << ", " << stuck << " stuck";
+  }
+  // It is not the rigid needle's.
+  EXPECT_GT(std::abs(jacobian[0][2] + 0.1 * std::sin(pose.theta_rad)), 5e-3);
+}
+
+TEST(Flexible, JacobianIsTheDerivativeOfTheStep) {
+  for (const fem::Type type : {fem::Type::Tri3, fem::Type::Quad4})
+    for (const bool back : {false, true}) expect_the_jacobian_of_the_next_step(type, back);
 }
 
 }  // namespace
