@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "common/needle/tube.hpp"
 #include "hand.hpp"
@@ -156,6 +157,50 @@ TEST(Flexible, NamesATickWithoutEquilibriumAndGoesOn) {
       ASSERT_LE(r.residual_n, Flexible::tolerance_n);
     }
   }
+}
+
+// The cut is kept in material coordinates: a needle that steered in comes out along its own cut, though its base goes elsewhere.
+TEST(Flexible, WithdrawsAlongTheCutPath) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  bend(hand);
+  const auto material_path = [&] {
+    std::vector<Vector2> path;
+    for (std::size_t i = 0; i < hand.model().contacts(); ++i) path.push_back(hand.model().working_set().point(i).material_m);
+    return path;
+  };
+  std::vector<Vector2> cut;
+  hand.move(0.0, 0.01);
+  const auto steer = [&](double dx, double dy, double turn) {
+    for (int k = 0; k < 20; ++k) {
+      hand.move(dx / 20, dy / 20, turn / 20);
+      cut.push_back(hand.model().working_set().tip_material_m());
+    }
+  };
+  steer(0.012, 0.02, 0.0);
+  steer(-0.004, 0.025, -0.3);
+  const std::vector<Vector2> at_depth = material_path();
+  double bow = 0.0;
+  for (const Vector2& x : cut) bow = std::max(bow, std::abs(x[0]));
+  EXPECT_GT(bow, 1e-3);  // it has steered
+  double off = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    hand.move(k < 30 ? 2e-5 : -5e-5, -5e-4, 0.0);
+    const std::vector<Vector2> now = material_path();
+    ASSERT_LE(now.size(), at_depth.size());
+    // What is left of the path is where it was cut; only the segment that the tip is in shrinks.
+    for (std::size_t i = 0; i + 1 < now.size(); ++i) ASSERT_EQ(now[i], at_depth[i]) << k;
+    const Vector2 tip = hand.model().working_set().tip_material_m();
+    double nearest = 1.0;
+    for (std::size_t i = 0; i + 1 < cut.size(); ++i) {
+      const Vector2 along{cut[i + 1][0] - cut[i][0], cut[i + 1][1] - cut[i][1]};
+      const Vector2 from{tip[0] - cut[i][0], tip[1] - cut[i][1]};
+      const double part = std::clamp((along[0] * from[0] + along[1] * from[1]) / (along[0] * along[0] + along[1] * along[1]), 0.0, 1.0);
+      nearest = std::min(nearest, std::hypot(from[0] - part * along[0], from[1] - part * along[1]));
+    }
+    off = std::max(off, nearest);
+  }
+  EXPECT_LT(off, 0.1 * bow);
+  EXPECT_EQ(hand.worst(), Status::Ok);
 }
 
 // Against steps from the same state with a perturbed base: those go on as the last step did, so every contact keeps its state. Advancing,
