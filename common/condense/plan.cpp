@@ -92,14 +92,16 @@ void check_method(const scene::Scene& scene, bool solid) {
     throw fem::Error("no [needle] or no [contact]: an image needs both; write them as in host/share/scenes");
   if (scene.needle->model == scene::NeedleModel::Thesis)
     throw fem::Error("needle.model = \"thesis\" is computed offline alone; write model = \"beam\" or \"rigid\"");
-  if (needle::lateral_per_axial(scene.needle->bevel) != 0.0)
-    throw fem::Error(
-        "needle.bevel_deg: the side force of a bevel does not act in an insertion yet; remove it, or write bevel = \"symmetric\"");
   if (scene.contact->method == contact::Method::Subdivide)
     throw fem::Error(
         "contact.method = \"subdivide\" changes the unknowns, which an image cannot; write \"embedded\", \"snap\" or \"adapt\"");
   if (scene.contact->method == contact::Method::Adapt && solid)
     throw fem::Error("contact.method = \"adapt\" moves nodes of planar elements, and this tissue is solid; write \"embedded\" or \"snap\"");
+  if (needle::lateral_per_axial(scene.needle->bevel) != 0.0 &&
+      (scene.contact->method != contact::Method::Embedded || scene.contact->explicit_count > 0))
+    throw fem::Error(
+        "needle.bevel_deg: the side force of a bevel acts where embedded contacts are cut; write contact.method = \"embedded\" and no "
+        "contact.points_m, or bevel = \"symmetric\"");
   if (scene.tissue.strain != fem::Strain::Linear)
     throw fem::Error("tissue.strain = \"green_lagrange\" cannot be condensed; write \"linear\"");
 }
@@ -169,6 +171,8 @@ Plan plan_checked(const scene::Scene& scene, fem::Mesh mesh, WithVisible with_vi
     result.needle.axial_n = beam.axial_n;
     result.needle.curvature_per_m = beam.curvature_per_m;
   }
+  result.needle.face_rad = scene.needle->bevel.angle_rad;
+  result.needle.tip_lateral = needle::lateral_per_axial(scene.needle->bevel);
   result.single_precision = scene.single_precision;
   if (with_visible == WithVisible::Yes) result.visible = visible_of(result.mesh, scene.visible);
   plan_contacts(scene, result);

@@ -14,6 +14,9 @@ constexpr double softness_of_short = 0.1;    // of its own compliance: about wha
 // Of the jumps. Between 0.1 and 0.15 hardly any error that accuracy_benchmark measures changes by a third, but without them forces along
 // grid lines alternate.
 constexpr double jump_stabilisation = 0.15;
+// Of what the tissue's own compliance would give for the lateral force that is missing: a tip that a bevel carries aside approaches that
+// force, and a long step does not carry it beyond.
+constexpr double largest_aside = 0.2;
 constexpr int most_cells = 512;  // that one walk crosses
 
 Vector2 plus(const Vector2& a, const Vector2& b) noexcept { return {a[0] + b[0], a[1] + b[1]}; }
@@ -28,7 +31,9 @@ double overlap(double a0, double a1, double b0, double b1) noexcept { return std
 
 }  // namespace
 
-void WorkingSet::open(const model::Tissue& tissue, const Law& law) noexcept {
+void WorkingSet::open(const model::Tissue& tissue, const Law& law, double face_rad, double tip_lateral) noexcept {
+  face_rad_ = face_rad;
+  tip_lateral_ = tip_lateral;
   tissue_ = &tissue;
   law_ = &law;
   geometry_.open(tissue);
@@ -49,6 +54,7 @@ void WorkingSet::clear() noexcept {
   tip_cell_ = -1;
   tip_inside_ = false;
   path_m_ = deepest_m_ = 0.0;
+  tip_excess_n_per_m_ = 0.0;
   softened_ = capacity::contacts;
 }
 
@@ -206,7 +212,7 @@ bool WorkingSet::place(const Vector2& x_m) noexcept {
   return true;
 }
 
-void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept {
+void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) noexcept {
   const std::size_t n = size();
   if (law_->explicit_count > 0) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -215,7 +221,7 @@ void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<
     }
     return;
   }
-  const double excess = std::max(0.0, tip_n_per_m - shaft_n_per_m);
+  const double excess = tip_excess_n_per_m_ = std::max(0.0, tip_n_per_m - shaft_n_per_m);
   const double zone_begins = deepest_m_ - law_->tip_zone_m;
   const bool nodes = law_->method != Method::Embedded;
   double begins = nodes ? 0.0 : point_[0].path_m;
@@ -251,14 +257,34 @@ double WorkingSet::reach(const Vector2& from_m, std::int32_t cell, const Vector2
   return std::min(distance, most_m);
 }
 
+// How far beside the tip, along the shaft's normal, a bevelled tip cuts: what it has cut beside it so far, which the tie of a short segment
+// has not pulled the tip onto yet, and what the face adds over the advance.
+double WorkingSet::aside_m(double length_m, const Vector2& direction) const noexcept {
+  const std::size_t i = size() - 1;
+  const Point& last = point_[i];
+  const double full_n = std::abs(tip_lateral_) * tip_excess_n_per_m_ * std::min(law_->tip_zone_m, path_m_);
+  if (full_n == 0.0) return 0.0;
+  const double side = std::copysign(1.0, face_rad_);
+  const Vector2 n{-side * direction[1], side * direction[0]};
+  const Block& own = own_[i];
+  const double most_m = full_n * (n[0] * (own[0] * n[0] + own[1] * n[1]) + n[1] * (own[2] * n[0] + own[3] * n[1]));
+  const double so_far_m = std::clamp(dot(minus(plus(last.begin_m, scaled(last.heading, length_m)), tip_), n), 0.0, largest_aside * most_m);
+  // Of the last segment, and of the one before as far as the last is too short for it.
+  const double grown = std::clamp(length_m / law_->spacing_m, 0.0, 1.0);
+  const double held_n = side * (solver_.contact(i).lateral_n + (i > 0 ? (1.0 - grown) * solver_.contact(i - 1).lateral_n : 0.0));
+  const double missing = std::clamp(1.0 + held_n / full_n, 0.0, 1.0);
+  return side * (so_far_m + missing * std::min((length_m - last.cut_m) * std::abs(face_rad_), largest_aside * most_m));
+}
+
 // The last segment's weights and tie for the length that it has now.
-void WorkingSet::resize_last(double length_m) noexcept {
+void WorkingSet::resize_last(double length_m, const Vector2& direction) noexcept {
   const std::size_t i = size() - 1;
   Point& last = point_[i];
   const double spacing = law_->spacing_m;
   // New tissue is cut where the tip goes; coming back, and going again, the segment keeps the course that was cut.
   if (length_m > last.cut_m) {
-    const Vector2 chord = minus(tip_, last.begin_m);
+    const double aside = tip_lateral_ != 0.0 ? aside_m(length_m, direction) : 0.0;
+    const Vector2 chord = minus(plus(tip_, scaled({-direction[1], direction[0]}, aside)), last.begin_m);
     last.heading = scaled(chord, 1.0 / dot(last.direction, chord));
     last.cut_m = length_m;
   }
@@ -429,7 +455,7 @@ void WorkingSet::follow_segments(const Vector2& direction, Trouble& trouble) noe
   double covered = clipped();
   while (covered >= spacing) {
     Point& last = point_[size() - 1];
-    resize_last(spacing);
+    resize_last(spacing, direction);
     if (size() == Solver::capacity) {
       trouble.full = true;
       break;
@@ -446,7 +472,7 @@ void WorkingSet::follow_segments(const Vector2& direction, Trouble& trouble) noe
   }
   if (size() == 0) return;
   covered = std::clamp(clipped(), 0.0, spacing);
-  resize_last(covered);
+  resize_last(covered, direction);
   path_m_ = point_[size() - 1].path_m + covered;
 }
 

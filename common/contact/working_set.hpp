@@ -16,6 +16,10 @@
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
 //     in the reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the
 //     tip.
+//   Bevelled tip (embedded): while it cuts, the tissue presses on its face and carries it aside, by the angle of the face at most, and less
+//     the more of the full lateral force F = tip_lateral * cutting force the ties at the tip hold already: the course of the cut is
+//     axis + face (1 - held / F), the bracket within 0 and 1. So the ties end up with about F, the needle bends under it, and the path
+//     curves; where the needle does not give way, the tissue does. First order in the spacing.
 //   Explicit: points given by the scene, none added or removed.
 // Thresholds: the density times the length that a contact carries, so their sum is the density times the path. Over the last tip_zone_m of
 // the path ever cut the tip's density replaces the shaft's, in the upper bound alone: only while new tissue is cut. Regularisation: 1e-6
@@ -61,8 +65,8 @@ class WorkingSet {
     bool not_adapted{};      // a node could not be moved and was pulled instead
   };
 
-  // Both must outlive this object; the image reader has checked them.
-  void open(const model::Tissue& tissue, const Law& law) noexcept;
+  // Both must outlive this object; the image reader has checked them. Face and lateral over cutting force: of a bevelled tip.
+  void open(const model::Tissue& tissue, const Law& law, double face_rad = 0.0, double tip_lateral = 0.0) noexcept;
   void clear() noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return solver_.size(); }
@@ -80,7 +84,7 @@ class WorkingSet {
   [[nodiscard]] bool place(const Vector2& x_m) noexcept;
 
   // Upper and lower bounds of every contact's axial force from the two densities.
-  void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept;
+  void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) noexcept;
 
   [[nodiscard]] bool in_tissue(const Vector2& x_m) const noexcept { return geometry_.locate(x_m, -1) >= 0; }
   // Turns the soft tie of the last segment into the frame of this tick. Before every solve.
@@ -114,7 +118,8 @@ class WorkingSet {
   void add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
   void push(const Point& point) noexcept;
   void pop() noexcept;
-  void resize_last(double length_m) noexcept;
+  void resize_last(double length_m, const Vector2& direction) noexcept;
+  [[nodiscard]] double aside_m(double length_m, const Vector2& direction) const noexcept;
   void push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept;
   void push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction, Trouble& trouble) noexcept;
   void find_tip(const Vector2& tip_m, Trouble& trouble) noexcept;
@@ -127,6 +132,9 @@ class WorkingSet {
 
   const model::Tissue* tissue_{nullptr};
   const Law* law_{nullptr};
+  double face_rad_{};
+  double tip_lateral_{};
+  double tip_excess_n_per_m_{};  // by which the tip's density is above the shaft's
   double regularisation_{};
   double least_compliance_{};
   Geometry geometry_{};

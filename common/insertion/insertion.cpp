@@ -61,7 +61,7 @@ const char* to_string(Status status) noexcept {
 
 void Insertion::open(const model::Image& image) noexcept {
   image_ = &image;
-  set_.open(image.tissue, *image.law);
+  set_.open(image.tissue, *image.law, image.needle.face_rad, image.needle.tip_lateral);
   density_.open(*image.law);
   bends_ = image.needle.elements > 0;
   if (bends_) flexible_.open(image.needle);

@@ -23,10 +23,12 @@ inline constexpr double explicit_point_tolerance_m = 1e-9;  // how far outside o
 struct Needle {
   double length_m{};         // from base to tip
   double radius_m{};         // outer; 0 when the scene gives none (planar scenes need none)
-  std::uint64_t elements{};  // of the beam; 0 for a rigid needle, and then what follows is 0 too
+  std::uint64_t elements{};  // of the beam; 0 for a rigid needle, and then the next three are 0 too
   double bending_nm2{};      // EI
   double axial_n{};          // EA
   double curvature_per_m{};  // of the unloaded needle
+  double face_rad{};         // of a bevelled tip, bend it or not: angle between face and shaft, and lateral over cutting force,
+  double tip_lateral{};      // both as in needle/bevel.hpp; 0 for a symmetric tip
 };
 
 // What a scene takes of common/core/capacities.hpp.

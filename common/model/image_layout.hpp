@@ -1,4 +1,4 @@
-// Bytes of a model image, version 2. Header, then the sections in the order of Section, each on the next multiple of image_alignment;
+// Bytes of a model image, version 3. Header, then the sections in the order of Section, each on the next multiple of image_alignment;
 // gaps are zero, and the file ends with the last section's last byte. Numbers are the machine's own (the byte order mark tells a foreign
 // one); structs are stored as they stand, and a section records their size, so that a change of layout is noticed as another version.
 #pragma once
@@ -14,7 +14,7 @@ namespace trocar::model::layout {
 
 inline constexpr std::array<char, 8> magic{'T', 'R', 'O', 'C', 'A', 'R', 'M', 'I'};
 inline constexpr std::uint32_t byte_order = 0x01020304;
-inline constexpr std::uint32_t version = 2;
+inline constexpr std::uint32_t version = 3;
 
 enum class Section : std::uint8_t {
   Parameters,

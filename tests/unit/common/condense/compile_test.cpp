@@ -278,7 +278,12 @@ TEST(Compile, RefusesByName) {
   expect_refusal([](auto& s) { s.needle.reset(); }, {"needle"});
   expect_refusal([](auto& s) { s.contact.reset(); }, {"contact"});
   expect_refusal([](auto& s) { s.needle->model = scene::NeedleModel::Thesis; }, {"needle.model", "offline"});
-  expect_refusal([](auto& s) { s.needle->bevel.angle_rad = 0.3; }, {"bevel_deg", "symmetric"});
+  expect_refusal(
+      [](auto& s) {
+        s.needle->bevel.angle_rad = 0.3;
+        s.contact->method = contact::Method::Snap;
+      },
+      {"bevel_deg", "embedded", "symmetric"});
   expect_refusal([](auto& s) { s.contact->method = contact::Method::Subdivide; }, {"subdivide"});
   expect_refusal([](auto& s) { s.contact->method = contact::Method::Adapt; }, {"adapt", "solid"}, solid_scene());
   expect_refusal([](auto& s) { s.tissue.strain = fem::Strain::GreenLagrange; }, {"green_lagrange"});
