@@ -16,6 +16,8 @@
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
 //     in the reference mesh. Contact j carries the path from half way to its predecessor to half way to its successor, the last one to the
 //     tip.
+//   Subdivided: a mesh that was cut along the path has nodes on it (fem/subdivide.hpp). They are named beforehand, and each becomes a
+//     contact as the tip passes it. Looked for at edges, from a tip that runs a little beside them, some are missed for their neighbours.
 //   Explicit: points given by the scene, none added or removed.
 // Thresholds: the density times the length that a contact carries, so their sum is the density times the path. Over the last tip_zone_m of
 // the path ever cut the tip's density replaces the shaft's, in the upper bound alone: only while new tissue is cut. Regularisation: 1e-6
@@ -64,6 +66,9 @@ class WorkingSet {
   // Both must outlive this object; the image reader has checked them.
   void open(const model::Tissue& tissue, const Law& law) noexcept;
   void clear() noexcept;
+  // Snap: these nodes in this order, none of them supported, are the contacts, in place of those found at edges. They must outlive the
+  // path; empty: none named. Call it while there is no contact; open() forgets them.
+  void name_nodes(std::span<const std::uint32_t> along_path) noexcept { named_ = along_path; }
 
   [[nodiscard]] std::size_t size() const noexcept { return solver_.size(); }
   [[nodiscard]] const Point& point(std::size_t i) const noexcept { return point_[i]; }
@@ -116,6 +121,8 @@ class WorkingSet {
   void pop() noexcept;
   void resize_last(double length_m) noexcept;
   void push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept;
+  void push_passed(const Vector2& direction, Trouble& trouble) noexcept;
+  void push_single(std::uint32_t node, const Vector2& begin_m, const Vector2& direction) noexcept;
   void push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction, Trouble& trouble) noexcept;
   void find_tip(const Vector2& tip_m, Trouble& trouble) noexcept;
   void follow_segments(const Vector2& direction, Trouble& trouble) noexcept;
@@ -133,6 +140,7 @@ class WorkingSet {
   Compliance compliance_{};
   Solver solver_{};
   std::array<Point, capacity::contacts> point_{};
+  std::span<const std::uint32_t> named_{};
   std::array<Block, capacity::contacts> row_{};
   std::array<Block, capacity::contacts> own_{};  // without the softness of its tie and the jump to its successor
   std::size_t softened_{};                       // the contact and
