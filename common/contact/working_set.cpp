@@ -42,6 +42,7 @@ void WorkingSet::open(const model::Tissue& tissue, const Law& law, double face_r
   // A contact tied to supported nodes alone has no compliance of its own; 1 / (E t) is the tissue's scale.
   const double depth = tissue.model == element::Model::Solid ? tissue.edge_length_m : tissue.thickness_m;
   least_compliance_ = 1e-9 / (tissue.material.front().young_pa * depth);
+  named_ = {};
   clear();
 }
 
@@ -342,14 +343,30 @@ void WorkingSet::push_node(const Vector2& crossing_m, const model::Cell& cell, s
       trouble.not_adapted = true;
     }
   }
+  push_single(node, crossing_m, direction);
+}
+
+void WorkingSet::push_single(std::uint32_t node, const Vector2& begin_m, const Vector2& direction) noexcept {
   Point point;
   point.at = single_node(node);
-  point.begin_m = crossing_m;
+  point.begin_m = begin_m;
   point.direction = direction;
   point.path_m = size() == 0 ? 0.0
                              : point_[size() - 1].path_m +
-                                   std::max(0.0, dot(point_[size() - 1].direction, minus(crossing_m, point_[size() - 1].begin_m)));
+                                   std::max(0.0, dot(point_[size() - 1].direction, minus(begin_m, point_[size() - 1].begin_m)));
   push(point);
+}
+
+void WorkingSet::push_passed(const Vector2& direction, Trouble& trouble) noexcept {
+  while (size() < named_.size()) {
+    const Vector2 x = geometry_.node_m(named_[size()]);
+    if (dot(direction, minus(tip_, x)) < 0.0) return;
+    if (size() == Solver::capacity) {
+      trouble.full = true;
+      return;
+    }
+    push_single(named_[size()], x, direction);
+  }
 }
 
 // From one point of the path to a later one, with a contact at each edge that it crosses.
@@ -392,10 +409,14 @@ WorkingSet::Trouble WorkingSet::enter(const Vector2& tip_m, const Vector2& direc
     push_segment(entry, direction, 0.0);
     follow_segments(direction, trouble);
   } else {
-    const Exit behind = geometry_.exit(entry_cell, entry, back);
-    push_node(entry, tissue_->cell[static_cast<std::size_t>(entry_cell)], behind.edge, direction, trouble);
+    if (!named_.empty()) {
+      push_passed(direction, trouble);
+    } else {
+      const Exit behind = geometry_.exit(entry_cell, entry, back);
+      push_node(entry, tissue_->cell[static_cast<std::size_t>(entry_cell)], behind.edge, direction, trouble);
+      if (size() > 0) walk(entry, entry_cell, tip_m, direction, trouble);
+    }
     if (size() == 0) return trouble;
-    walk(entry, entry_cell, tip_m, direction, trouble);
     path_m_ = point_[size() - 1].path_m + std::max(0.0, beyond_last());
   }
   deepest_m_ = path_m_;
@@ -479,7 +500,10 @@ void WorkingSet::follow_segments(const Vector2& direction, Trouble& trouble) noe
 void WorkingSet::follow_nodes(const Vector2& before_m, std::int32_t cell, const Vector2& direction, Trouble& trouble) noexcept {
   while (size() > 0 && beyond_last() < 0.0) pop();
   if (size() == 0) return;
-  if (dot(minus(tip_, before_m), point_[size() - 1].direction) > 0.0) walk(before_m, cell, tip_, direction, trouble);
+  if (!named_.empty())
+    push_passed(direction, trouble);
+  else if (dot(minus(tip_, before_m), point_[size() - 1].direction) > 0.0)
+    walk(before_m, cell, tip_, direction, trouble);
   double beyond = std::max(0.0, beyond_last());
   if (!tip_inside_) {
     const Point& last = point_[size() - 1];

@@ -20,6 +20,8 @@
 //     the more of the full lateral force F = tip_lateral * cutting force the ties at the tip hold already: the course of the cut is
 //     axis + face (1 - held / F), the bracket within 0 and 1. So the ties end up with about F, the needle bends under it, and the path
 //     curves; where the needle does not give way, the tissue does. First order in the spacing.
+//   Subdivided: a mesh that was cut along the path has nodes on it (fem/subdivide.hpp). They are named beforehand, and each becomes a
+//     contact as the tip passes it. Looked for at edges, from a tip that runs a little beside them, some are missed for their neighbours.
 //   Explicit: points given by the scene, none added or removed.
 // Thresholds: the density times the length that a contact carries, so their sum is the density times the path. Over the last tip_zone_m of
 // the path ever cut the tip's density replaces the shaft's, in the upper bound alone: only while new tissue is cut. Regularisation: 1e-6
@@ -68,6 +70,9 @@ class WorkingSet {
   // Both must outlive this object; the image reader has checked them. Face and lateral over cutting force: of a bevelled tip.
   void open(const model::Tissue& tissue, const Law& law, double face_rad = 0.0, double tip_lateral = 0.0) noexcept;
   void clear() noexcept;
+  // Snap: these nodes in this order, none of them supported, are the contacts, in place of those found at edges. They must outlive the
+  // path; empty: none named. Call it while there is no contact; open() forgets them.
+  void name_nodes(std::span<const std::uint32_t> along_path) noexcept { named_ = along_path; }
 
   [[nodiscard]] std::size_t size() const noexcept { return solver_.size(); }
   [[nodiscard]] const Point& point(std::size_t i) const noexcept { return point_[i]; }
@@ -121,6 +126,8 @@ class WorkingSet {
   void resize_last(double length_m, const Vector2& direction) noexcept;
   [[nodiscard]] double aside_m(double length_m, const Vector2& direction) const noexcept;
   void push_segment(const Vector2& begin_m, const Vector2& direction, double path_m) noexcept;
+  void push_passed(const Vector2& direction, Trouble& trouble) noexcept;
+  void push_single(std::uint32_t node, const Vector2& begin_m, const Vector2& direction) noexcept;
   void push_node(const Vector2& crossing_m, const model::Cell& cell, std::size_t edge, const Vector2& direction, Trouble& trouble) noexcept;
   void find_tip(const Vector2& tip_m, Trouble& trouble) noexcept;
   void follow_segments(const Vector2& direction, Trouble& trouble) noexcept;
@@ -141,6 +148,7 @@ class WorkingSet {
   Compliance compliance_{};
   Solver solver_{};
   std::array<Point, capacity::contacts> point_{};
+  std::span<const std::uint32_t> named_{};
   std::array<Block, capacity::contacts> row_{};
   std::array<Block, capacity::contacts> own_{};  // without the softness of its tie and the jump to its successor
   std::size_t softened_{};                       // the contact and

@@ -159,6 +159,7 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
     tip_n_per_m_ = density_.tip_n_per_m(std::abs(speed_m_s_));
   }
   const bool first = !started_;
+  rests_ = started_ && base.x_m == pose_.x_m && base.y_m == pose_.y_m && base.theta_rad == pose_.theta_rad;
   pose_ = base;
   if (bends_ && set_.size() == 0 && !flexible_.free(base)) result.status = worst(result.status, Status::NotConverged);
   if (!bends_ || set_.size() == 0) take_tip();
@@ -178,8 +179,8 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
   }
   started_ = true;
 
-  if (set_.size() > 0) {
-    set_.soften_last(tip_axis_);
+  if (set_.size() > 0 || !skip_) {
+    if (set_.size() > 0) set_.soften_last(tip_axis_);
     set_.set_bounds(shaft_n_per_m_, tip_n_per_m_, {target_.data(), set_.size()});
     if (bends_)
       solve_bending(result);
@@ -213,6 +214,13 @@ void Insertion::take_tip() noexcept {
   }
 }
 
+// Without forces the last solution is none, and the solver has to find it again.
+void Insertion::release() noexcept {
+  std::array<contact::Contact, capacity::contacts> free{};
+  for (std::size_t i = 0; i < set_.size(); ++i) free[i].state = set_.solver().contact(i).state;
+  set_.solver().assume({free.data(), set_.size()});
+}
+
 void Insertion::solve_rigid(Result& result) noexcept {
   const std::size_t n = set_.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -220,7 +228,10 @@ void Insertion::solve_rigid(Result& result) noexcept {
     target_[i].tangent = axis_;
     target_[i].gap_m = {pose_.x_m + p.arclength_m * axis_[0] - p.material_m[0], pose_.y_m + p.arclength_m * axis_[1] - p.material_m[1]};
   }
-  if (!skip_) set_.solver().forget_factor();
+  if (!skip_) {
+    set_.solver().forget_factor();
+    if (rests_) release();
+  }
   const contact::Solution solution = set_.solver().solve({target_.data(), n});
   result.status = worst(result.status, status_of(solution.status));
   result.pivots = solution.pivots;

@@ -6,7 +6,8 @@
 //   what the base applies to the needle = sum f_i, sum (X_i + u_i - b) x f_i: right-handed about the base point (MODELS 8).
 // A needle that bends: flexible.hpp; the tip goes where the bent shaft points.
 // Skips, none of which changes a result: needle outside of the tissue, no contact solve; rigid needle, no beam; no state, frame or geometry
-// changed, the factor is used again (solver.hpp); nothing changed at all, the last forces stay. One step is a pure function of (state,
+// changed, the factor is used again (solver.hpp); nothing changed at all, the last forces stay: the solution to 1e-13 N, where all others
+// keep every bit. One step is a pure function of (state,
 // pose, dt): no allocation, lock, system call, exception; bounded time whatever the mesh.
 #pragma once
 
@@ -89,13 +90,15 @@ class Insertion {
   [[nodiscard]] double speed_m_s() const noexcept { return speed_m_s_; }  // along the shaft, filtered
   [[nodiscard]] double shaft_n_per_m() const noexcept { return shaft_n_per_m_; }
 
-  // For tests and benchmarks: every step computes everything again. Changes no result.
+  // For tests and benchmarks: every step computes everything again, from force-free contacts when the base rests, and outside of the tissue
+  // with none. Changes no result.
   void skip(bool enabled) noexcept { skip_ = enabled; }
 
  private:
   bool place_explicit() noexcept;
   void anchor_fresh() noexcept;
   void take_tip() noexcept;
+  void release() noexcept;
   void solve_rigid(Result& result) noexcept;
   void solve_bending(Result& result) noexcept;
   [[nodiscard]] Wrench base_wrench() const noexcept;
@@ -110,6 +113,7 @@ class Insertion {
   std::array<contact::Target, capacity::contacts> target_{};
   bool skip_{true};
   bool started_{false};
+  bool rests_{false};  // the base is where it was in the last step
   Pose pose_{};
   Vector2 axis_{1.0, 0.0};
   double speed_m_s_{};

@@ -71,10 +71,17 @@ std::string_view name_of(contact::State state) {
   return "slip_backward";
 }
 
+// From one entry to the complete withdrawal, the first path row with a contact onwards.
+struct Cut {
+  std::size_t row{};
+  std::vector<fem::Point> point{};         // that the tip cuts through
+  std::vector<std::uint32_t> candidate{};  // nodes of the cut mesh on it, those supported left out
+};
+
 // A compiled scene and a needle in it. The large objects live on the heap.
 class Run {
  public:
-  Run(const scene::Scene& scene, condense::Plan plan) {
+  Run(const scene::Scene& scene, condense::Plan plan, std::vector<Cut> cuts = {}) : cuts_(std::move(cuts)) {
     condense::Options options;
     options.visible = condense::WithVisible::No;
     const bool show = isatty(STDERR_FILENO) == 1;
@@ -87,8 +94,12 @@ class Run {
     insertion_->open(image_);
   }
 
-  // From the last row to this one. Returns the last step's result with the pivots of all, and the first status that is not Ok in `worst`.
-  Result advance(const Row& row, Status& worst) {
+  // From the last row to this one, number `at`. Returns the last step's result with the pivots of all, and the first status that is not Ok
+  // in `worst`.
+  Result advance(std::size_t at, const Row& row, Status& worst) {
+    if (insertion_->contacts() == 0)
+      for (const Cut& cut : cuts_)
+        if (cut.row == at) insertion_->working_set().name_nodes(cut.candidate);
     int steps = 1;
     if (last_ && image_.law->explicit_count == 0) {
       const double length = image_.needle.length_m;
@@ -125,48 +136,94 @@ class Run {
   [[nodiscard]] const model::Image& image() const { return image_; }
 
  private:
+  std::vector<Cut> cuts_{};
   condense::Compiled compiled_{};
   model::Image image_{};
   std::unique_ptr<Insertion> insertion_ = std::make_unique<Insertion>();
   std::optional<Row> last_{};
 };
 
-// The material points that the tip cuts through, at least `spacing_m` apart, by the embedded method.
-std::vector<fem::Point> cut_path(const scene::Scene& scene, const std::vector<Row>& path) {
+[[noreturn]] void leaves_corridor(const std::filesystem::path& path_file, const scene::Scene& scene, const Row& row) {
+  throw config::UserError(fmt::format("{}: at t_s = {} the path leaves the candidate corridor; widen contact.corridor in {}",
+                                      path_file.string(), row.t_s, scene.file.string()));
+}
+
+// The material points that the tip cuts through, a quarter of an edge apart but for the last one, by the embedded method.
+std::vector<Cut> cut_paths(const scene::Scene& scene, const std::filesystem::path& path_file, const std::vector<Row>& path) {
   scene::Scene embedded = scene;
   embedded.contact->method = contact::Method::Embedded;
   Run run(embedded, condense::plan(embedded, condense::WithVisible::No));
-  std::vector<fem::Point> points;
+  const double edge_m = run.image().tissue.edge_length_m;
+  std::vector<Cut> cuts;
   double deepest = 0.0;
-  Status worst = Status::Ok;
-  for (const Row& row : path) {
-    (void)run.advance(row, worst);
+  bool outside = true;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    Status worst = Status::Ok;
+    (void)run.advance(i, path[i], worst);
+    if (worst == Status::LeftCandidates) leaves_corridor(path_file, scene, path[i]);
     const contact::WorkingSet& set = run.insertion().working_set();
-    if (set.size() == 0 || !(set.deepest_m() > deepest)) continue;
-    deepest = set.deepest_m();
-    if (points.empty()) {
-      const auto& entry = set.point(0).begin_m;
-      points.push_back({entry[0], entry[1], 0.0});
+    if (set.size() == 0) {
+      outside = true;
+      continue;
     }
+    if (outside) {
+      const auto& entry = set.point(0).begin_m;
+      cuts.push_back({.row = i, .point = {{entry[0], entry[1], 0.0}}});
+      deepest = 0.0;
+      outside = false;
+    }
+    if (!(set.deepest_m() > deepest)) continue;
+    deepest = set.deepest_m();
+    std::vector<fem::Point>& points = cuts.back().point;
     const auto tip = set.tip_material_m();
-    const double way = std::hypot(tip[0] - points.back()[0], tip[1] - points.back()[1]);
-    if (way > 0.25 * run.image().tissue.edge_length_m) points.push_back({tip[0], tip[1], 0.0});
+    const auto to_tip = [&tip](const fem::Point& x) { return std::hypot(tip[0] - x[0], tip[1] - x[1]); };
+    if (to_tip(points.back()) == 0.0) continue;
+    // The last point is where the tip was deepest; those before it stay apart.
+    if (points.size() > 1 && to_tip(points[points.size() - 2]) < 0.25 * edge_m) points.pop_back();
+    points.push_back({tip[0], tip[1], 0.0});
   }
-  return points;
+  return cuts;
 }
 
-// Subdivide: the mesh is cut along the path that the embedded method finds; then the path's nodes are contacts as they are passed.
-Run subdivided(scene::Scene scene, const std::vector<Row>& path) {
-  const std::vector<fem::Point> points = cut_path(scene, path);
+// Nodes along the cut in order; the mesh gets them where it has none.
+std::vector<int> cut_mesh(fem::Mesh& mesh, const std::vector<fem::Point>& points) {
+  std::vector<int> nodes;
+  for (std::size_t i = 1; i < points.size(); ++i)
+    for (const int node : fem::subdivide(mesh, points[i - 1], points[i]))
+      if (std::find(nodes.begin(), nodes.end(), node) == nodes.end()) nodes.push_back(node);
+  return nodes;
+}
+
+// Subdivide: the mesh is cut along the path that the embedded method finds; then the cut's nodes are contacts as they are passed.
+Run subdivided(scene::Scene scene, const std::filesystem::path& path_file, const std::vector<Row>& path) {
+  std::vector<Cut> cuts = cut_paths(scene, path_file, path);
   fem::Mesh mesh;
+  std::vector<std::vector<int>> nodes;
   try {
     mesh = fem::make_mesh(scene.tissue);
-    for (std::size_t i = 1; i < points.size(); ++i) (void)fem::subdivide(mesh, points[i - 1], points[i]);
+    for (const Cut& cut : cuts) nodes.push_back(cut_mesh(mesh, cut.point));
   } catch (const fem::Error& error) {
     throw config::UserError(fmt::format("{}: {}", scene.file.string(), error.what()));
   }
   scene.contact->method = contact::Method::Snap;
-  return {scene, condense::plan(scene, std::move(mesh), condense::WithVisible::No)};
+  condense::Plan plan = condense::plan(scene, std::move(mesh), condense::WithVisible::No);
+  // Candidates of planar tissue are the mesh's own nodes.
+  std::map<model::Vector2, std::uint32_t> candidate;
+  for (std::uint32_t n = 0; n < plan.candidates.node_m.size(); ++n) candidate.emplace(plan.candidates.node_m[n], n);
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    for (const int node : nodes[k]) {
+      const fem::Point& x = plan.mesh.node[static_cast<std::size_t>(node)];
+      const auto found = candidate.find({x[0], x[1]});
+      if (found == candidate.end()) leaves_corridor(path_file, scene, path[cuts[k].row]);
+      if ((plan.candidates.flags[found->second] & (model::fixed_x | model::fixed_y)) == 0) cuts[k].candidate.push_back(found->second);
+    }
+    if (cuts[k].candidate.size() > capacity::contacts)
+      throw config::UserError(
+          fmt::format("{}: the cut along the path has {} nodes, each of them a contact, and the capacity is {}; take a "
+                      "coarser mesh, a shorter path or the method \"embedded\"",
+                      scene.file.string(), cuts[k].candidate.size(), capacity::contacts));
+  }
+  return {scene, std::move(plan), std::move(cuts)};
 }
 
 std::string off_shaft(const scene::Scene& scene, const Pose& base) {
@@ -229,7 +286,7 @@ int run_insert(const InsertOptions& options) {
   if (subdivide && scene.contact->explicit_count > 0)
     throw config::UserError(fmt::format("{}: contact.method = \"subdivide\" cuts a path, and explicit points cut none; write \"embedded\"",
                                         scene.file.string()));
-  Run run = subdivide ? subdivided(scene, path) : Run(scene, condense::plan(scene, condense::WithVisible::No));
+  Run run = subdivide ? subdivided(scene, options.path, path) : Run(scene, condense::plan(scene, condense::WithVisible::No));
 
   std::map<Status, std::pair<std::size_t, double>> trouble;  // rows, time of the first
   std::vector<double> solve_us;
@@ -239,12 +296,10 @@ int run_insert(const InsertOptions& options) {
     const Row& row = path[i];
     Status worst = Status::Ok;
     const auto begin = std::chrono::steady_clock::now();
-    const Result r = run.advance(row, worst);
+    const Result r = run.advance(i, row, worst);
     const double us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
     if (worst == Status::OffShaft) throw config::UserError(fmt::format("{}: {}", scene.file.string(), off_shaft(scene, row.pose)));
-    if (worst == Status::LeftCandidates)
-      throw config::UserError(fmt::format("{}: at t_s = {} the path leaves the candidate corridor; widen contact.corridor in {}",
-                                          options.path.string(), row.t_s, scene.file.string()));
+    if (worst == Status::LeftCandidates) leaves_corridor(options.path, scene, row);
     if (worst != Status::Ok) {
       auto& entry = trouble.try_emplace(worst, 0, row.t_s).first->second;
       ++entry.first;

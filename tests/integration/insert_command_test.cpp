@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <vector>
 
@@ -73,6 +74,49 @@ TEST(InsertCommand, WritesARowAPathRowThatItsContactsExplain) {
     EXPECT_GT(result.number(32, 8), 0.8) << method;   // pushes in
     EXPECT_LT(result.number(48, 8), -0.3) << method;  // holds back on the way out
     EXPECT_EQ(result.number(64, 10), 0.0) << method;
+  }
+}
+
+// Hardly any friction, so the tip cuts the straight line: a contact for every grid line and diagonal that it crosses. These two lines pass
+// no node of the grids closer than a twentieth of an edge, where one node stands for the edges around it.
+TEST(InsertCommand, SubdivideMakesAContactOfEveryCrossingOfAnObliquePath) {
+  struct Line {
+    double x_m, angle_rad;
+  };
+  constexpr double depth_m = 0.024;
+  constexpr double needle_m = 0.10;
+  for (const Line& line : {Line{-0.0039, 0.45}, Line{-0.0011, -0.45}}) {
+    const double tx = std::sin(line.angle_rad);
+    const double ty = std::cos(line.angle_rad);
+    for (const int nodes : {21, 41, 81}) {
+      const double edge_m = 0.1 / (nodes - 1);
+      int crossed = 0;
+      for (int i = -nodes; i <= nodes; ++i)
+        for (const double along : {i * edge_m / ty, (i * edge_m - line.x_m) / tx, (i * edge_m + line.x_m) / (ty - tx)})
+          crossed += along >= 0.0 && along <= depth_m ? 1 : 0;
+      const Scratch scratch;
+      std::ostringstream grid, corridor, csv;
+      for (std::ostringstream* text : {&grid, &corridor, &csv}) text->precision(17);
+      grid << "nodes = [" << nodes << ", " << nodes << "], element = \"tri3\"";
+      corridor << "corridor = { from_m = [" << line.x_m << ", 0.215], to_m = [" << line.x_m + 0.03 * tx << ", " << 0.215 + 0.03 * ty
+               << "], half_width_m = 0.006 }";
+      write_text(scratch / "scene.toml", shared_file("scenes/phantom.toml", {{"nodes = [21, 21], element = \"quad4\"", grid.str()},
+                                                                             {"velocity_law = \"phantom_pvc\"", corridor.str()},
+                                                                             {"shaft_n_per_m = 34.0", "shaft_n_per_m = 1e-4"},
+                                                                             {"tip_n_per_m = 68.0", "tip_n_per_m = 2e-4"}}));
+      csv << "t_s,x_m,y_m,theta_rad\n";
+      for (int k = -2; k <= 24; ++k)
+        csv << k + 2 << ',' << line.x_m + (0.001 * k - needle_m) * tx << ',' << 0.215 + (0.001 * k - needle_m) * ty << ','
+            << std::numbers::pi / 2 - line.angle_rad << '\n';
+      write_text(scratch / "path.csv", csv.str());
+      Program run(scratch, "trocar",
+                  {"insert", (scratch / "scene.toml").string(), "--path", (scratch / "path.csv").string(), "--out",
+                   (scratch / "r.csv").string(), "--method", "subdivide"});
+      ASSERT_EQ(run.wait(60.0), 0) << run.errors();
+      EXPECT_EQ(run.errors(), "");
+      const Table result = read_table(scratch / "r.csv");
+      EXPECT_EQ(result.number(26, 10), crossed) << nodes << " nodes, " << line.angle_rad << " rad";
+    }
   }
 }
 

@@ -225,6 +225,110 @@ TEST_P(InsertionBy, SkippingChangesNoResult) {
   EXPECT_LT(2 * skipped, computed);
 }
 
+// A base that rests keeps the last forces: those that a solve from force-free contacts finds. Outside of the tissue no contact is solved:
+// the same as solving none. In and out, twice, with rests everywhere.
+TEST_P(InsertionBy, RestingAndStandingOutsideChangeNoResult) {
+  Hand skips(grid(), GetParam().method);
+  Hand computes(grid(), GetParam().method);
+  computes.model().skip(false);
+  int kept = 0, solved = 0, outside = 0;
+  double apart_n = 0.0;
+  const auto compare = [&](bool resting) {
+    skips.step();
+    computes.step();
+    const Result& a = skips.result();
+    const Result& b = computes.result();
+    ASSERT_EQ(a.status, b.status);
+    ASSERT_EQ(a.contacts, b.contacts);
+    ASSERT_NEAR(a.path_m, b.path_m, 1e-12);
+    const auto wrench = wrench_of(a);
+    const auto other = wrench_of(b);
+    for (std::size_t k = 0; k < 3; ++k) apart_n = std::max(apart_n, std::abs(wrench[k] - other[k]));
+    if (a.contacts == 0) {
+      ++outside;
+      ASSERT_EQ(wrench, other);
+      ASSERT_EQ((std::array{a.tip.x_m, a.tip.y_m, a.tip.theta_rad}), (std::array{b.tip.x_m, b.tip.y_m, b.tip.theta_rad}));
+    } else if (resting) {
+      kept += a.iterations == 0 ? 1 : 0;
+      solved += b.iterations > 0 ? 1 : 0;
+    }
+    for (std::size_t i = 0; i < skips.model().contacts(); ++i) ASSERT_EQ(skips.model().contact(i).state, computes.model().contact(i).state);
+  };
+  for (const Pose& by : {Pose{0.001, 0.04, 0.0}, Pose{0.0, -0.004, 0.01}, Pose{0.0015, 0.012, 0.02}, Pose{0.0, -0.06, -0.03},
+                         Pose{-0.003, 0.05, 0.0}, Pose{0.0, -0.05, 0.0}}) {
+    constexpr int steps = 400;
+    for (int k = 0; k < steps; ++k) {
+      for (Hand* hand : {&skips, &computes}) {
+        hand->pose.x_m += by.x_m / steps;
+        hand->pose.y_m += by.y_m / steps;
+        hand->pose.theta_rad += by.theta_rad / steps;
+      }
+      compare(false);
+      for (int rest = 0; rest < (k % 20 == 19 ? 5 : 0); ++rest) compare(true);
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_LT(apart_n, 1e-13);  // of some 2 N
+  EXPECT_GT(kept, 100);
+  EXPECT_GE(solved, kept);
+  EXPECT_GT(outside, 200);
+}
+
+// The same for a needle that bends, whose shape stands free there too.
+TEST(Insertion, ABendingNeedleOutsideNeedsNoContactSolve) {
+  for (const double curvature_per_m : {0.0, 2.0}) {
+    Hand skips(grid_of(fem::Type::Tri3));
+    Hand computes(grid_of(fem::Type::Tri3));
+    for (Hand* hand : {&skips, &computes}) {
+      model::Needle& needle = hand->image().needle;
+      needle.elements = 24;
+      needle.bending_nm2 = 2.3e-3;
+      needle.axial_n = 5e4;
+      needle.curvature_per_m = curvature_per_m;
+      hand->pose.y_m -= 0.02;
+      hand->open();
+    }
+    computes.model().skip(false);
+    int outside = 0;
+    for (const Pose& by : {Pose{0.001, 0.015, 0.1}, Pose{0.0, 0.0, -0.05}, Pose{0.0, 0.02, 0.0}, Pose{0.0, -0.04, 0.1}}) {
+      for (int k = 0; k < 200; ++k) {
+        for (Hand* hand : {&skips, &computes}) {
+          hand->pose.x_m += by.x_m / 200;
+          hand->pose.y_m += by.y_m / 200;
+          hand->pose.theta_rad += by.theta_rad / 200;
+          hand->step();
+          ASSERT_EQ(hand->result().status, Status::Ok);
+        }
+        const Result& a = skips.result();
+        const Result& b = computes.result();
+        ASSERT_EQ(a.contacts, b.contacts);
+        if (a.contacts > 0) continue;
+        ++outside;
+        ASSERT_EQ(wrench_of(a), wrench_of(b));
+        ASSERT_NEAR(a.tip.x_m, b.tip.x_m, 1e-12);
+        ASSERT_NEAR(a.tip.y_m, b.tip.y_m, 1e-12);
+        ASSERT_NEAR(a.tip.theta_rad, b.tip.theta_rad, 1e-11);
+      }
+    }
+    EXPECT_GT(outside, 300);
+    EXPECT_LT(outside, 800);
+  }
+}
+
+TEST_P(InsertionBy, ARigidNeedleHasNoUseForItsStiffness) {
+  Hand plain(grid(), GetParam().method);
+  Hand stiff(grid(), GetParam().method);
+  model::Needle& needle = stiff.image().needle;
+  needle.elements = 0;
+  needle.bending_nm2 = 2.3e-3;
+  needle.axial_n = 5e4;
+  needle.curvature_per_m = 3.0;
+  stiff.open();
+  for (Hand* hand : {&plain, &stiff}) hand->move(0.001, 0.05, 0.03);
+  EXPECT_EQ(wrench_of(plain.result()), wrench_of(stiff.result()));
+  EXPECT_GT(plain.base().fy_n, 0.5);
+}
+
 TEST_P(InsertionBy, RefusesPosesThatAreNotNumbers) {
   Hand hand(grid(), GetParam().method);
   Hand untouched(grid(), GetParam().method);
