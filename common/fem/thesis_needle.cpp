@@ -255,7 +255,8 @@ ThesisNeedle::Result ThesisNeedle::fixed_point(const FixedPointOptions& options)
     ++result.iterations;
     result.step_m = step_.cwiseAbs().maxCoeff();
     u_ += step_;
-    if (!(result.step_m <= 10.0 * properties_.length_m)) {
+    // The first step is the linear answer, which may be as long as it likes.
+    if (!std::isfinite(result.step_m) || (result.iterations > 1 && result.step_m > 10.0 * properties_.length_m)) {
       result.status = Status::Diverged;
       break;
     }
@@ -279,7 +280,8 @@ ThesisNeedle::Status ThesisNeedle::advance(double fraction, const NewtonOptions&
     solve(tangent_, residual_, step_);
     ++result.iterations;
     result.step_m = step_.cwiseAbs().maxCoeff();
-    if (!std::isfinite(result.step_m)) return Status::NotConverged;
+    // An infinite stiffness makes a step of zero.
+    if (!std::isfinite(result.step_m) || !residual_.allFinite()) return Status::NotConverged;
     if (options.predicted_stress) predict_stress();
     u_ += step_;
     if (result.step_m > options.tolerance * properties_.length_m) continue;

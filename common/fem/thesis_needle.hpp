@@ -56,7 +56,7 @@ class ThesisNeedle {
   enum class Status : std::uint8_t {
     Converged,
     NotConverged,  // out of iterations: the fixed point creeps or goes to and fro
-    Diverged,      // the fixed point left the needle's surroundings: a step of ten lengths
+    Diverged,      // the fixed point left the needle's surroundings: a step of ten lengths after the first
     Unstable,      // Newton: equilibrium, but not of least energy
     Inverted,      // Newton: a triangle would be turned inside out
   };
