@@ -19,6 +19,9 @@ void require(bool valid, const char* name, double value, const char* remedy) {
   if (!valid) throw Error(std::string("thesis needle: ") + name + " = " + number + ": " + remedy);
 }
 
+// NaN when an entry is.
+double largest(const Eigen::Ref<const VectorXd>& v) { return v.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(); }
+
 }  // namespace
 
 // Of u in a triangle, over x and y; and what follows from them.
@@ -229,20 +232,21 @@ int ThesisNeedle::factor(Matrix& k) const {
 }
 
 void ThesisNeedle::solve(const Matrix& factored, const VectorXd& right, VectorXd& x) const {
-  const Eigen::Index size = x.size();
+  constexpr Eigen::Index below = band - 1;
+  using Below = Eigen::Map<const Eigen::Matrix<double, below, 1>>;
+  const Eigen::Index size = x.size(), whole = size - below;  // columns before it have all their entries
+  const auto l = [&](Eigen::Index column) { return factored[static_cast<std::size_t>(column)].data(); };
   x.head(clamped).setZero();
   x.tail(size - clamped) = right.tail(size - clamped);
-  const auto length = [&](Eigen::Index column) { return std::min<Eigen::Index>(band, size - column); };
-  for (Eigen::Index column = clamped; column < size; ++column) {
-    const double* const l = factored[static_cast<std::size_t>(column)].data();
-    for (Eigen::Index i = 1; i < length(column); ++i) x(column + i) -= l[i] * x(column);
+  for (Eigen::Index column = clamped; column < whole; ++column) x.segment<below>(column + 1) -= x(column) * Below(l(column) + 1);
+  for (Eigen::Index column = std::max<Eigen::Index>(whole, clamped); column < size; ++column)
+    for (Eigen::Index row = column + 1; row < size; ++row) x(row) -= l(column)[row - column] * x(column);
+  for (Eigen::Index column = size - 1; column >= std::max<Eigen::Index>(whole, clamped); --column) {
+    x(column) *= l(column)[0];
+    for (Eigen::Index row = column + 1; row < size; ++row) x(column) -= l(column)[row - column] * x(row);
   }
-  for (Eigen::Index column = size - 1; column >= clamped; --column) {
-    const double* const l = factored[static_cast<std::size_t>(column)].data();
-    double sum = l[0] * x(column);
-    for (Eigen::Index i = 1; i < length(column); ++i) sum -= l[i] * x(column + i);
-    x(column) = sum;
-  }
+  for (Eigen::Index column = whole - 1; column >= clamped; --column)
+    x(column) = l(column)[0] * x(column) - Below(l(column) + 1).dot(x.segment<below>(column + 1));
 }
 
 ThesisNeedle::Result ThesisNeedle::fixed_point(const FixedPointOptions& options) {
@@ -253,21 +257,21 @@ ThesisNeedle::Result ThesisNeedle::fixed_point(const FixedPointOptions& options)
     subtract_internal_force(u_, residual_);
     solve(linear_, residual_, step_);
     ++result.iterations;
-    result.step_m = step_.cwiseAbs().maxCoeff();
+    result.step_m = largest(step_);
     u_ += step_;
     // The first step is the linear answer, which may be as long as it likes.
     if (!std::isfinite(result.step_m) || (result.iterations > 1 && result.step_m > 10.0 * properties_.length_m)) {
       result.status = Status::Diverged;
       break;
     }
-    if (result.step_m <= options.tolerance * u_.cwiseAbs().maxCoeff()) {
+    if (result.step_m <= options.tolerance * largest(u_)) {
       result.status = Status::Converged;
       break;
     }
   }
   residual_ = load_;
   subtract_internal_force(u_, residual_);
-  result.residual_n = largest_residual();
+  result.residual_n = largest(residual_.tail(residual_.size() - clamped));
   return result;
 }
 
@@ -279,7 +283,7 @@ ThesisNeedle::Status ThesisNeedle::advance(double fraction, const NewtonOptions&
     const int not_positive = factor(tangent_);
     solve(tangent_, residual_, step_);
     ++result.iterations;
-    result.step_m = step_.cwiseAbs().maxCoeff();
+    result.step_m = largest(step_);
     // An infinite stiffness makes a step of zero.
     if (!std::isfinite(result.step_m) || !residual_.allFinite()) return Status::NotConverged;
     if (options.predicted_stress) predict_stress();
@@ -311,7 +315,7 @@ ThesisNeedle::Result ThesisNeedle::newton(const NewtonOptions& options) {
   }
   residual_ = result.load_fraction * load_;
   subtract_internal_force(u_, residual_);
-  result.residual_n = largest_residual();
+  result.residual_n = largest(residual_.tail(residual_.size() - clamped));
   return result;
 }
 

@@ -131,7 +131,6 @@ class ThesisNeedle {
   [[nodiscard]] bool inverted() const;
   int factor(Matrix& k) const;  // L D L^T in place; how many pivots are not positive
   void solve(const Matrix& factored, const Eigen::VectorXd& right, Eigen::VectorXd& x) const;
-  [[nodiscard]] double largest_residual() const { return residual_.tail(residual_.size() - clamped).cwiseAbs().maxCoeff(); }
   Status advance(double fraction, const NewtonOptions& options, Result& result);
 
   ThesisNeedleProperties properties_;

@@ -77,7 +77,9 @@ VectorXd motion(const ThesisNeedle& needle, double size) {
 constexpr ThesisNeedleProperties thick{.length_m = 0.03, .depth_m = 0.01, .thickness_m = 0.002, .young_pa = 1e6, .elements = 5};
 
 TEST(ThesisNeedle, SmallLoadComplianceIsThatOfLinearStatics) {
-  for (const ThesisNeedleProperties& p : {printed, thick}) {
+  ThesisNeedleProperties shortest = thick;
+  shortest.elements = 1;
+  for (const ThesisNeedleProperties& p : {printed, thick, shortest}) {
     const AsTissue other(p);
     const VectorXd u = Statics(other.mesh, other.tissue).solve(other.tip_load(0.0, 1.0));
     const double tip = 0.5 * (u(other.row(p.elements, 1) + 1) + u(other.row(p.elements, 2) + 1));
@@ -182,6 +184,12 @@ TEST(ThesisNeedle, FixedPointDoesNotConvergeBeyondALoadAndSaysSo) {
     EXPECT_LT(fixed.iterations, 100);
     // Newton starts from rest, not from there.
     EXPECT_EQ(needle.newton().status, Status::Converged);
+  }
+  for (const double force : {1e9, 1e100, 1e300}) {
+    ThesisNeedle hopeless = bent(printed, 0.0, force);
+    EXPECT_EQ(hopeless.fixed_point().status, Status::Diverged) << force;
+    EXPECT_NE(hopeless.newton().status, Status::Converged) << force;
+    EXPECT_TRUE(hopeless.displacement_m().allFinite());
   }
   ThesisNeedle needle = bent(printed, 0.0, 0.01);
   ThesisNeedle::FixedPointOptions few;
