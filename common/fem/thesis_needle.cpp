@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include "common/fem/tissue.hpp"
 
@@ -48,11 +50,15 @@ ThesisNeedle::ThesisNeedle(const ThesisNeedleProperties& properties) : propertie
   moduli_.shear = p.young_pa / (2 * (1 + p.poisson));
   along_m_ = p.length_m / p.elements;
   across_m_ = p.depth_m / (across - 1);
+  per_along_ = 1.0 / along_m_;
+  per_across_ = 1.0 / across_m_;
   volume_m3_ = 0.5 * along_m_ * across_m_ * p.thickness_m;
 
   const Eigen::Index size = Eigen::Index{2} * across * stations();
-  for (VectorXd* v : {&load_, &u_, &kept_, &step_, &residual_}) v->setZero(size);
-  linear_.resize(static_cast<std::size_t>(size + band), Column{});
+  for (VectorXd* v : {&load_, &u_, &kept_, &residual_}) v->setZero(size);
+  step_.setZero(size + window);
+  linear_.column.resize(static_cast<std::size_t>(size + window), Column{});
+  linear_.inverse_pivot.resize(static_cast<std::size_t>(size), 0.0);
   tangent_ = linear_;
   stress_.resize(std::size_t{2} * (across - 1) * static_cast<std::size_t>(p.elements));
   assemble(u_, nullptr, linear_, residual_);
@@ -87,7 +93,7 @@ ThesisNeedle::Slopes ThesisNeedle::slopes(const VectorXd& u, int node) const {
   const double* x1 = along_first ? corner : last;
   const double* y0 = along_first ? corner : first;
   const double* y1 = along_first ? last : corner;
-  const double x = 1.0 / along_m_, y = 1.0 / across_m_;
+  const double x = per_along_, y = per_across_;
   return {x * (x1[0] - x0[0]), x * (x1[1] - x0[1]), y * (y1[0] - y0[0]), y * (y1[1] - y0[1])};
 }
 
@@ -111,7 +117,7 @@ template <ThesisNeedle::Direction direction>
 void ThesisNeedle::subtract_force(const Slopes& h, const Stress& s, double* f) const {
   constexpr bool along_first = direction == Direction::AlongThenAcross;
   constexpr int corner = along_first ? 2 * across : 2, last = 2 * across + 2;
-  const double ax = volume_m3_ / along_m_, ay = volume_m3_ / across_m_;
+  const double ax = volume_m3_ * per_along_, ay = volume_m3_ * per_across_;
   const double along[2] = {ax * ((1 + h.ux) * s[0] + h.uy * s[2]), ax * (h.vx * s[0] + (1 + h.vy) * s[2])};
   const double over[2] = {ay * ((1 + h.ux) * s[2] + h.uy * s[1]), ay * (h.vx * s[2] + (1 + h.vy) * s[1])};
   for (int a = 0; a < 2; ++a) {
@@ -124,9 +130,9 @@ void ThesisNeedle::subtract_force(const Slopes& h, const Stress& s, double* f) c
 
 // residual -= f_int(u), and K(u) in k. `stress`, when given, stands in for C E(u) in the geometric part of K.
 void ThesisNeedle::assemble(const VectorXd& u, const Stress* stress, Matrix& k, VectorXd& residual) const {
-  for (Column& column : k) std::fill_n(column.begin(), band, 0.0);
-  const double axx = volume_m3_ / (along_m_ * along_m_), axy = volume_m3_ / (along_m_ * across_m_),
-               ayy = volume_m3_ / (across_m_ * across_m_);
+  for (Column& column : k.column) column.row.fill(0.0);
+  const double axx = volume_m3_ * per_along_ * per_along_, axy = volume_m3_ * per_along_ * per_across_,
+               ayy = volume_m3_ * per_across_ * per_across_;
   const auto [normal, coupled, shear] = moduli_;
   double* const r = residual.data();
   each_triangle([&]<Direction direction>(std::size_t triangle, int node) {
@@ -154,7 +160,10 @@ void ThesisNeedle::assemble(const VectorXd& u, const Stress* stress, Matrix& k, 
     const double p00 = along_first ? x00 : y00, p01 = along_first ? x01 : y01, p11 = along_first ? x11 : y11;
     const double q00 = along_first ? y00 : x00, q01 = along_first ? y01 : x01, q11 = along_first ? y11 : x11;
     const double b01 = along_first ? m01 : m10, b10 = along_first ? m10 : m01;  // row p, column q
-    const auto at = [&](int column) { return k[static_cast<std::size_t>(2 * node + column)].data(); };
+    const auto at = [&](int column) {
+      const int c = 2 * node + column;
+      return k.column[static_cast<std::size_t>(c)].row.data() + c % 4;
+    };
     double* const first0 = at(0);
     double* const first1 = at(1);
     first0[0] += p00;
@@ -210,43 +219,64 @@ bool ThesisNeedle::inverted() const {
   return any;
 }
 
+// Subtracts column k[0] from the ones that it reaches. phase: its number modulo 4.
+template <int phase>
+bool ThesisNeedle::eliminate(Column* k, double& inverse_pivot) {
+  constexpr int end = (phase + band - 1) / 4 * 4 + 4;  // the rows behind are zero
+  using Rows = Eigen::Array<double, end, 1>;
+  Eigen::Map<Rows> l(k[0].row.data());
+  const Rows from = l;
+  inverse_pivot = 1.0 / from(phase);
+  Rows part = inverse_pivot * from;
+  part.template head<phase + 1>().setZero();
+  l = part;
+  [&]<int... index>(std::integer_sequence<int, index...>) {
+    const auto subtract = [&]<int row>(std::integral_constant<int, row>) {
+      constexpr int first = row / 4 * 4;
+      Eigen::Map<Eigen::Array<double, end - first, 1>>(k[row - phase].row.data()) -= part(row) * from.template tail<end - first>();
+    };
+    (subtract(std::integral_constant<int, phase + 1 + index>{}), ...);
+  }
+  (std::make_integer_sequence<int, band - 1>{});
+  return from(phase) > 0.0;
+}
+
 int ThesisNeedle::factor(Matrix& k) const {
   int not_positive = 0;
   const auto size = static_cast<std::size_t>(u_.size());
-  for (std::size_t column = clamped; column < size; ++column) {
-    Column& l = k[column];
-    if (!(l[0] > 0.0)) ++not_positive;
-    const double inverse = 1.0 / l[0];
-    std::array<double, band> part;
-    for (std::size_t i = 0; i < band; ++i) part[i] = inverse * l[i];
-    for (std::size_t i = 1; i < band; ++i) {
-      // Always `band` entries, the last ones zero: loops of constant length become vector instructions.
-      double* const below = k[column + i].data();
-      const double* const from = l.data() + i;
-      for (std::size_t m = 0; m < band; ++m) below[m] -= part[i] * from[m];
-    }
-    l[0] = inverse;
-    std::copy(part.begin() + 1, part.end(), l.begin() + 1);
+  for (std::size_t c = clamped; c < size; c += 4) {
+    Column* const column = &k.column[c];
+    double* const inverse = &k.inverse_pivot[c];
+    not_positive += eliminate<0>(column, inverse[0]) ? 0 : 1;
+    not_positive += eliminate<1>(column + 1, inverse[1]) ? 0 : 1;
+    not_positive += eliminate<2>(column + 2, inverse[2]) ? 0 : 1;
+    not_positive += eliminate<3>(column + 3, inverse[3]) ? 0 : 1;
   }
   return not_positive;
 }
 
 void ThesisNeedle::solve(const Matrix& factored, const VectorXd& right, VectorXd& x) const {
-  constexpr Eigen::Index below = band - 1;
-  using Below = Eigen::Map<const Eigen::Matrix<double, below, 1>>;
-  const Eigen::Index size = x.size(), whole = size - below;  // columns before it have all their entries
-  const auto l = [&](Eigen::Index column) { return factored[static_cast<std::size_t>(column)].data(); };
-  x.head(clamped).setZero();
-  x.tail(size - clamped) = right.tail(size - clamped);
-  for (Eigen::Index column = clamped; column < whole; ++column) x.segment<below>(column + 1) -= x(column) * Below(l(column) + 1);
-  for (Eigen::Index column = std::max<Eigen::Index>(whole, clamped); column < size; ++column)
-    for (Eigen::Index row = column + 1; row < size; ++row) x(row) -= l(column)[row - column] * x(column);
-  for (Eigen::Index column = size - 1; column >= std::max<Eigen::Index>(whole, clamped); --column) {
-    x(column) *= l(column)[0];
-    for (Eigen::Index row = column + 1; row < size; ++row) x(column) -= l(column)[row - column] * x(row);
+  using Rows = Eigen::Matrix<double, window, 1>;
+  using Later = Eigen::Matrix<double, window - 4, 1>;
+  const Eigen::Index size = right.size();
+  x.head<clamped>().setZero();
+  x.segment(clamped, size - clamped) = right.tail(size - clamped);
+  x.tail<window>().setZero();
+  const auto l = [&](Eigen::Index column) { return factored.column[static_cast<std::size_t>(column)].row.data(); };
+  for (Eigen::Index four = clamped; four < size; four += 4) {
+    Eigen::Map<Rows> rows(x.data() + four);
+    for (int i = 0; i < 4; ++i) rows -= rows(i) * Eigen::Map<const Rows>(l(four + i));
   }
-  for (Eigen::Index column = whole - 1; column >= clamped; --column)
-    x(column) = l(column)[0] * x(column) - Below(l(column) + 1).dot(x.segment<below>(column + 1));
+  for (Eigen::Index four = size - 4; four >= clamped; four -= 4) {
+    const Eigen::Map<const Later> later(x.data() + four + 4);
+    double now[4];
+    for (int i = 3; i >= 0; --i) {
+      now[i] =
+          factored.inverse_pivot[static_cast<std::size_t>(four + i)] * x(four + i) - Eigen::Map<const Later>(l(four + i) + 4).dot(later);
+      for (int j = i + 1; j < 4; ++j) now[i] -= l(four + i)[j] * now[j];
+    }
+    for (int i = 0; i < 4; ++i) x(four + i) = now[i];
+  }
 }
 
 ThesisNeedle::Result ThesisNeedle::fixed_point(const FixedPointOptions& options) {
@@ -258,7 +288,7 @@ ThesisNeedle::Result ThesisNeedle::fixed_point(const FixedPointOptions& options)
     solve(linear_, residual_, step_);
     ++result.iterations;
     result.step_m = largest(step_);
-    u_ += step_;
+    u_ += step_.head(u_.size());
     // The first step is the linear answer, which may be as long as it likes.
     if (!std::isfinite(result.step_m) || (result.iterations > 1 && result.step_m > 10.0 * properties_.length_m)) {
       result.status = Status::Diverged;
@@ -287,7 +317,7 @@ ThesisNeedle::Status ThesisNeedle::advance(double fraction, const NewtonOptions&
     // An infinite stiffness makes a step of zero.
     if (!std::isfinite(result.step_m) || !residual_.allFinite()) return Status::NotConverged;
     if (options.predicted_stress) predict_stress();
-    u_ += step_;
+    u_ += step_.head(u_.size());
     if (result.step_m > options.tolerance * properties_.length_m) continue;
     if (not_positive > 0) return Status::Unstable;
     return inverted() ? Status::Inverted : Status::Converged;
@@ -345,24 +375,34 @@ VectorXd ThesisNeedle::internal_force_n(const VectorXd& displacement_m) const {
 }
 
 Eigen::MatrixXd ThesisNeedle::tangent_n_per_m(const VectorXd& displacement_m) const {
-  Matrix k(tangent_.size(), Column{});
+  Matrix k = tangent_;
   VectorXd unused = VectorXd::Zero(u_.size());
   assemble(displacement_m, nullptr, k, unused);
   const Eigen::Index size = u_.size() - clamped;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index column = 0; column < size; ++column)
     for (Eigen::Index row = column; row < std::min<Eigen::Index>(size, column + band); ++row)
-      all(row, column) = all(column, row) = k[static_cast<std::size_t>(column + clamped)][static_cast<std::size_t>(row - column)];
+      all(row, column) = all(column, row) =
+          k.column[static_cast<std::size_t>(column + clamped)].row[static_cast<std::size_t>(row - column / 4 * 4)];
   return all;
 }
 
 double ThesisNeedle::small_load_compliance_m_per_n() const {
   const Eigen::Index at = u_.size() - 2 * across + across - 1;  // y of the inner nodes of the tip
-  VectorXd right = VectorXd::Zero(u_.size());
-  right(at) = right(at + 2) = 0.5;
-  VectorXd x(u_.size());
-  solve(linear_, right, x);
-  return 0.5 * (x(at) + x(at + 2));
+  VectorXd load = VectorXd::Zero(u_.size()), x(u_.size() + window);
+  load(at) = load(at + 2) = 0.5;
+  solve(linear_, load, x);
+  // K0 is conditioned like (L / depth)^4, and half of the digits of x are rounding. f_int, by differences in each triangle, has nearly all
+  // of them: two corrections bring them back, at a load so small that f_q is below rounding.
+  const double small = 1e-9 * properties_.depth_m / x(at);
+  VectorXd u = small * x.head(u_.size());
+  for (int k = 0; k < 2; ++k) {
+    VectorXd residual = small * load;
+    subtract_internal_force(u, residual);
+    solve(linear_, residual, x);
+    u += x.head(u_.size());
+  }
+  return 0.5 * (u(at) + u(at + 2)) / small;
 }
 
 const char* to_string(ThesisNeedle::Status status) noexcept {

@@ -107,9 +107,18 @@ class ThesisNeedle {
  private:
   static constexpr int clamped = 2 * across;
   static constexpr int band = 2 * (across + 1) + 2;  // entries of a column from its diagonal down
-  // A column of a symmetric matrix from its diagonal down, and zeros: elimination reads `band` entries from any of the first ones.
-  using Column = std::array<double, std::size_t{2} * band>;
-  using Matrix = std::vector<Column>;
+  static constexpr int window = 16;
+  static_assert(band <= window - 3 && clamped % 4 == 0);
+  // A column of a symmetric matrix: 16 rows from its number rounded down to a multiple of four. So all columns and vectors that elimination
+  // combines are aligned alike, and what one step stores the next loads whole: with the diagonal first a Newton iteration takes twice as
+  // long.
+  struct alignas(64) Column {
+    std::array<double, window> row;
+  };
+  struct Matrix {
+    std::vector<Column> column;
+    std::vector<double> inverse_pivot;  // factored: L below the diagonal and zeros elsewhere in the column
+  };
   using Stress = std::array<double, 3>;
 
   struct Moduli {
@@ -130,13 +139,17 @@ class ThesisNeedle {
   void predict_stress();
   [[nodiscard]] bool inverted() const;
   int factor(Matrix& k) const;  // L D L^T in place; how many pivots are not positive
+  template <int phase>
+  static bool eliminate(Column* k, double& inverse_pivot);
   void solve(const Matrix& factored, const Eigen::VectorXd& right, Eigen::VectorXd& x) const;
   Status advance(double fraction, const NewtonOptions& options, Result& result);
 
   ThesisNeedleProperties properties_;
   Moduli moduli_;
   double along_m_{}, across_m_{}, volume_m3_{};  // of a triangle
-  Eigen::VectorXd load_, u_, kept_, step_, residual_;
+  double per_along_{}, per_across_{};            // 1 / m: a division costs as much as all else of a leg
+  Eigen::VectorXd load_, u_, kept_, residual_;
+  Eigen::VectorXd step_;     // of solve: followed by a window of zeros
   Matrix linear_, tangent_;  // K0, factored; K
   std::vector<Stress> stress_;
 };

@@ -90,9 +90,10 @@ TEST(NeedleCommand, BendsTheTrianglesOfTheThesisAndSaysHow) {
   says(bend("young_pa = 9.8e8\nelements = 15\n", {"--tip-force", "0,0.1", "--at", "0.07,0,0.1"}),
        {"E = 980 MPa (as stated)", "the fixed point diverges", "by Newton's method"});
   EXPECT_GT(rows_of(read_text(out)).back()[2], 0.01);
-  says(bend("elements = 30\n", {"--tip-force", "0,0.1", "--json"}),
-       {"\"rows\": 31", "\"base_fy_n\": -0.1", "\"fitted\": true", "\"method\": \"newton\"", "\"fixed_point\": \"diverged\"",
-        "\"residual_n\""});
+  const std::string json = bend("elements = 30\n", {"--tip-force", "0,0.1", "--json"});
+  says(json, {"\"rows\": 31", "\"fitted\": true", "\"method\": \"newton\"", "\"fixed_point\": \"diverged\"", "\"residual_n\""});
+  const std::string key = "\"base_fy_n\": ";
+  EXPECT_NEAR(std::stod(json.substr(json.find(key) + key.size())), -0.1, 1e-9);
   EXPECT_EQ(rows_of(read_text(out)).size(), 31u);
 }
 
