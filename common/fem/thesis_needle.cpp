@@ -21,6 +21,9 @@ void require(bool valid, const char* name, double value, const char* remedy) {
   if (!valid) throw Error(std::string("thesis needle: ") + name + " = " + number + ": " + remedy);
 }
 
+// Of every fourth number in a column or a vector. Eigen's own vectors are aligned to what the target's instructions want, at most.
+constexpr int aligned = std::min<int>(Eigen::AlignedMax, Eigen::Aligned32);
+
 // NaN when an entry is.
 double largest(const Eigen::Ref<const VectorXd>& v) { return v.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(); }
 
@@ -224,7 +227,7 @@ template <int phase>
 bool ThesisNeedle::eliminate(Column* k, double& inverse_pivot) {
   constexpr int end = (phase + band - 1) / 4 * 4 + 4;  // the rows behind are zero
   using Rows = Eigen::Array<double, end, 1>;
-  Eigen::Map<Rows> l(k[0].row.data());
+  Eigen::Map<Rows, aligned> l(k[0].row.data());
   const Rows from = l;
   inverse_pivot = 1.0 / from(phase);
   Rows part = inverse_pivot * from;
@@ -233,7 +236,7 @@ bool ThesisNeedle::eliminate(Column* k, double& inverse_pivot) {
   [&]<int... index>(std::integer_sequence<int, index...>) {
     const auto subtract = [&]<int row>(std::integral_constant<int, row>) {
       constexpr int first = row / 4 * 4;
-      Eigen::Map<Eigen::Array<double, end - first, 1>>(k[row - phase].row.data()) -= part(row) * from.template tail<end - first>();
+      Eigen::Map<Eigen::Array<double, end - first, 1>, aligned>(k[row - phase].row.data()) -= part(row) * from.template tail<end - first>();
     };
     (subtract(std::integral_constant<int, phase + 1 + index>{}), ...);
   }
@@ -264,15 +267,15 @@ void ThesisNeedle::solve(const Matrix& factored, const VectorXd& right, VectorXd
   x.tail<window>().setZero();
   const auto l = [&](Eigen::Index column) { return factored.column[static_cast<std::size_t>(column)].row.data(); };
   for (Eigen::Index four = clamped; four < size; four += 4) {
-    Eigen::Map<Rows> rows(x.data() + four);
-    for (int i = 0; i < 4; ++i) rows -= rows(i) * Eigen::Map<const Rows>(l(four + i));
+    Eigen::Map<Rows, aligned> rows(x.data() + four);
+    for (int i = 0; i < 4; ++i) rows -= rows(i) * Eigen::Map<const Rows, aligned>(l(four + i));
   }
   for (Eigen::Index four = size - 4; four >= clamped; four -= 4) {
-    const Eigen::Map<const Later> later(x.data() + four + 4);
+    const Eigen::Map<const Later, aligned> later(x.data() + four + 4);
     double now[4];
     for (int i = 3; i >= 0; --i) {
-      now[i] =
-          factored.inverse_pivot[static_cast<std::size_t>(four + i)] * x(four + i) - Eigen::Map<const Later>(l(four + i) + 4).dot(later);
+      now[i] = factored.inverse_pivot[static_cast<std::size_t>(four + i)] * x(four + i) -
+               Eigen::Map<const Later, aligned>(l(four + i) + 4).dot(later);
       for (int j = i + 1; j < 4; ++j) now[i] -= l(four + i)[j] * now[j];
     }
     for (int i = 0; i < 4; ++i) x(four + i) = now[i];
