@@ -50,12 +50,17 @@ Needle needle_of(const config::Table& table) {
   needle.where = table.where("model");
   needle.length_m = table.number("length_m", {0.005, 1.0}, "from base to tip, such as 0.1");
   const bool beam = needle.model == NeedleModel::Beam;
+  const bool thesis = needle.model == NeedleModel::Thesis;
+  if (thesis) needle.elements = fem::ThesisNeedleProperties{}.elements;
   needle.elements =
       static_cast<int>(table.integer_or("elements", needle.elements, 1, beam ? most_beam_elements : 1000,
                                         beam ? "along the needle, such as 24 (capacity needle_elements)" : "along the needle, such as 24"));
   // A needle bent to a whole turn would meet itself.
   const double most_curvature = 2.0 * std::numbers::pi / needle.length_m;
   needle.curvature_per_m = table.number_or("curvature_per_m", 0.0, {-most_curvature, most_curvature}, "1 over the radius, such as 5.0");
+  if (thesis && needle.curvature_per_m != 0.0)
+    table.fail("curvature_per_m", "the needle of the thesis is straight; remove it, or write model = \"beam\"");
+  needle.young_stated = table.has("young_pa");
   needle.bevel = bevel_of(table);
 
   if (table.has("gauge")) {
@@ -93,6 +98,15 @@ needle::Properties beam_of(const Needle& needle) {
                     needle.where, needle.model == NeedleModel::Rigid ? "rigid" : "thesis"));
   const needle::Section section = needle::section_of(*needle.outer_m, *needle.inner_m, *needle.young_pa);
   return {needle.length_m, section.bending_nm2, section.axial_n, needle.curvature_per_m, static_cast<std::size_t>(needle.elements)};
+}
+
+fem::ThesisNeedleProperties triangles_of(const Needle& needle) {
+  fem::ThesisNeedleProperties triangles{needle.length_m, *needle.outer_m, *needle.outer_m, *needle.young_pa};
+  triangles.elements = needle.elements;
+  if (!needle.young_stated)
+    triangles.young_pa =
+        fem::fitted_young_pa(triangles, needle::section_of(*needle.outer_m, *needle.inner_m, *needle.young_pa).bending_nm2);
+  return triangles;
 }
 
 }  // namespace trocar::scene

@@ -18,6 +18,8 @@
 //     (material = "steel" | "nitinol" or young_pa; steel with a gauge, required without), (elements), (curvature_per_m: of the unloaded
 //     needle, counter-clockwise), (bevel = "symmetric", or bevel_deg: angle between face and shaft, positive with the point on the left;
 //     with it bevel_friction), common/needle/tube.hpp and bevel.hpp say more
+//     model = "thesis" (fem/thesis_needle.hpp; `trocar needle bend` alone): elements 15 unless stated, straight; young_pa is that of the
+//     triangles, such as 980e6 as printed, and without it they get the compliance of the tube in its material
 //   [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m,
 //     (velocity_law = "none" or a name below),
 //     (spacing_m: of embedded contacts, an edge unless stated, 1.5 in a solid),
@@ -33,6 +35,7 @@
 #include <optional>
 #include <string>
 
+#include "common/fem/thesis_needle.hpp"
 #include "common/fem/tissue.hpp"
 #include "common/model/law.hpp"
 #include "common/needle/beam.hpp"
@@ -46,6 +49,7 @@ struct Needle {
   NeedleModel model{};
   double length_m{};                                       // from base to tip
   std::optional<double> outer_m{}, inner_m{}, young_pa{};  // diameters of the tube; a rigid needle may have none
+  bool young_stated{};                                     // rather than a material's
   int elements{24};
   double curvature_per_m{};
   needle::Bevel bevel{};
@@ -80,6 +84,9 @@ struct Scene {
 
 // Throws config::UserError unless the needle's model is "beam".
 [[nodiscard]] needle::Properties beam_of(const Needle& needle);
+
+// The triangles of the model "thesis", as deep and thick as the tube; their modulus as stated, or fitted to the tube.
+[[nodiscard]] fem::ThesisNeedleProperties triangles_of(const Needle& needle);
 
 // For commands that insert: throws config::UserError for a scene without needle or contact, or with the offline model of the thesis.
 void require_insertion(const Scene& scene);

@@ -177,14 +177,16 @@ int main(int argc, char** argv) {
       "bend",
       "the shape of a needle that bends under forces that keep their direction; base clamped at the origin, along +x\n"
       "Example: trocar needle bend chiba_20g --tip-force 0,0.2 --at 0.07,0,-0.1 --out shape.csv\n"
-      "Result: s_m,x_m,y_m,theta_rad, s along the unloaded needle, a row for each node and mid-node of the elements.");
+      "Result: s_m,x_m,y_m,theta_rad, s along the unloaded needle, a row for each node and mid-node of the elements.\n"
+      "With model = \"thesis\" a row for each column of nodes of its triangles, and which of its methods found the shape.");
   cli::NeedleBendOptions bend;
   const auto numbers = [](std::size_t count, const char* pattern) {
     return CLI::Validator([count, pattern](std::string& text) { return cli::wrong_numbers(text, count, pattern); }, pattern);
   };
   bend_command
       ->add_option("needle", bend.needle,
-                   "needle name, or path of a TOML file that holds the table [needle] alone, or of a whole scene; model = \"beam\"")
+                   "needle name, or path of a TOML file that holds the table [needle] alone, or of a whole scene; model = \"beam\" "
+                   "or \"thesis\"")
       ->required();
   bend_command->add_option("--tip-force", bend.tip_force, "force on the tip, N")->check(numbers(2, "FX,FY"));
   bend_command->add_option("--tip-moment", bend.tip_moment_nm, "moment on the tip, N m, counter-clockwise")->check(CLI::Range(-1e6, 1e6));

@@ -13,7 +13,7 @@ struct NeedleBendOptions {
   std::string tip_force{};         // "FX,FY", N; empty: none
   double tip_moment_nm{};
   std::vector<std::string> at{};  // "S,FX,FY": m from the base, N
-  std::filesystem::path out{};    // CSV s_m,x_m,y_m,theta_rad, a row for each node and mid-node, base to tip
+  std::filesystem::path out{};    // CSV s_m,x_m,y_m,theta_rad, a row for each node and mid-node (thesis: column of nodes), base to tip
   bool json{};
 };
 

@@ -1,7 +1,7 @@
 trocar_library(tests/benchmarks/needle
-  SOURCES elastica.cpp output.cpp
-  DEPENDS common_needle
-  PRIVATE_DEPENDS fmt::fmt host_report)
+  SOURCES elastica.cpp output.cpp thesis_figure.cpp
+  DEPENDS common_needle tests_benchmarks_contact
+  PRIVATE_DEPENDS common_fem fmt::fmt host_report)
 trocar_program(needle_benchmark SOURCES needle/needle_benchmark.cpp
   DEPENDS tests_benchmarks_needle tests_benchmarks_contact tests_reference_grid_image common_insertion common_needle Eigen3::Eigen fmt::fmt)
 # That it runs to its end and meets what does not depend on time; its times are for people.

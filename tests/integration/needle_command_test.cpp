@@ -65,6 +65,38 @@ TEST(NeedleCommand, TakesASceneANameAndManyForces) {
   EXPECT_NE(help.out().find("Example: trocar needle bend"), std::string::npos);
 }
 
+TEST(NeedleCommand, BendsTheTrianglesOfTheThesisAndSaysHow) {
+  const Scratch scratch;
+  const std::string out = (scratch / "shape.csv").string();
+  const auto bend = [&](const std::string& keys, const Words& more) {
+    write_text(scratch / "thesis.toml", "[needle]\nmodel = \"thesis\"\ngauge = \"20G\"\nlength_m = 0.15\n" + keys);
+    Words arguments{"needle", "bend", (scratch / "thesis.toml").string(), "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    Program program(scratch, "trocar", arguments);
+    EXPECT_EQ(program.wait(answer_s), 0) << program.errors();
+    EXPECT_EQ(program.errors(), "");
+    return program.out();
+  };
+  const auto says = [](const std::string& said, const Words& words) {
+    for (const std::string& word : words) EXPECT_NE(said.find(word), std::string::npos) << "misses \"" << word << "\": " << said;
+  };
+  // Fitted: at small load the tube's P L^3 / (3 EI).
+  says(bend("", {"--tip-force", "0,0.001"}), {"16 rows", "16 x 4 nodes", "fitted", "the fixed point converged in"});
+  auto rows = rows_of(read_text(out));
+  ASSERT_EQ(rows.size(), 16u);
+  EXPECT_EQ(rows.front(), (std::vector<double>{0.0, 0.0, 0.0, 0.0}));
+  EXPECT_EQ(rows.back()[0], 0.15);
+  EXPECT_NEAR(rows.back()[2] / (0.001 * std::pow(0.15, 3) / (3 * 5.3753571419360002e-3)), 1.0, 1e-4);
+  says(bend("young_pa = 9.8e8\nelements = 15\n", {"--tip-force", "0,0.1", "--at", "0.07,0,0.1"}),
+       {"E = 980 MPa (as stated)", "the fixed point diverges", "by Newton's method"});
+  EXPECT_GT(rows_of(read_text(out)).back()[2], 0.01);
+  const std::string json = bend("elements = 30\n", {"--tip-force", "0,0.1", "--json"});
+  says(json, {"\"rows\": 31", "\"fitted\": true", "\"method\": \"newton\"", "\"fixed_point\": \"diverged\"", "\"residual_n\""});
+  const std::string key = "\"base_fy_n\": ";
+  EXPECT_NEAR(std::stod(json.substr(json.find(key) + key.size())), -0.1, 1e-9);
+  EXPECT_EQ(rows_of(read_text(out)).size(), 31u);
+}
+
 TEST(NeedleCommand, RefusesAndLeavesNothing) {
   const Scratch scratch;
   const std::string needle = (scratch / "needle.toml").string();
@@ -86,6 +118,12 @@ TEST(NeedleCommand, RefusesAndLeavesNothing) {
   refuses(needle, {"--at", "0.2,0,1"}, {"--at 0.2,0,1", "from 0 to 0.15 m"});
   refuses(needle, {"--tip-force", "-3,0"}, {"unstable", "add a small lateral force"});
   refuses(needle, {"--tip-force", "1e300,0"}, {"not finite", "lower them"});
+  const std::string thesis = (scratch / "thesis.toml").string();
+  write_text(thesis, "[needle]\nmodel = \"thesis\"\ngauge = \"20G\"\nlength_m = 0.15\n");
+  refuses(thesis, {"--tip-moment", "0.01"}, {"thesis.toml:2", "--tip-moment 0.01", "leave the moment out"});
+  for (const char* force : {"0,1e9", "0,1e300"}) refuses(thesis, {"--tip-force", force}, {"thesis.toml:2", "% of the loads", "lower them"});
+  write_text(scratch / "curved.toml", "[needle]\nmodel = \"thesis\"\ngauge = \"20G\"\nlength_m = 0.15\ncurvature_per_m = 2.0\n");
+  refuses((scratch / "curved.toml").string(), {}, {"curved.toml:5", "needle.curvature_per_m = 2", "straight", "write model = \"beam\""});
   for (const Words& wrong : {Words{"--tip-force", "0"}, Words{"--tip-force", "0,nan"}, Words{"--at", "0.1,0"}, Words{"--at", "0.1,0,1,2"},
                              Words{"--tip-moment", "x"}}) {
     Words arguments{"needle", "bend", needle, "--out", out};

@@ -10,16 +10,6 @@
 namespace trocar::bench {
 namespace {
 
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
-
 constexpr const char* figures = R"(
 set datafile separator ','
 set terminal svg size 900,500 font 'sans,14' background 'white'
@@ -34,9 +24,23 @@ set xlabel 'error of the tip over the length'
 set ylabel 'time of a solution [us]'
 csv = folder.'/needle_bend.csv'
 plot for [load in '1 3 10'] csv skip 1 using (strcol(1) eq 'elastica' && $4 == real(load) ? $5 : NaN):8 with linespoints pt 7 title 'P L^2 / EI = '.load
+
+set output folder.'/needle_thesis.svg'
+set title 'Run time against error: thesis figure 5.13 at 0.5 N, ours of 2 to 24 elements, triangles of 8 to 240 with E fitted'
+plot for [method in 'ours thesis'] csv skip 1 using (strcol(1) eq 'figure 5.13' && strcol(2) eq method && $4 > 2 ? $5 : NaN):8 with linespoints pt 7 title method
 )";
 
 }  // namespace
+
+void write_file(const std::filesystem::path& path, const std::string& text) {
+  const std::filesystem::path part = path.string() + ".part";
+  {
+    std::ofstream file(part, std::ios::binary);
+    file << text;
+    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
+  }
+  std::filesystem::rename(part, path);
+}
 
 void print(const std::vector<BendRow>& rows) {
   fmt::print("{:<12} {:<8} {:>8} {:>8} {:>12} {:>7} {:>10} {:>12} {:>24}\n", "scene", "method", "elements", "load", "error / L", "order",

@@ -24,11 +24,14 @@ struct StepRow {
   double median_s{}, quartile1_s{}, quartile3_s{};
 };
 
+// All or nothing: a temporary file, renamed. Throws std::runtime_error.
+void write_file(const std::filesystem::path& path, const std::string& text);
+
 void print(const std::vector<BendRow>& rows);
 void print(const std::vector<StepRow>& rows, double floor_s);
 
-// needle_bend.csv, needle_step.csv, needle_bend.svg. Throws std::runtime_error or report::ReportError when the folder cannot be written or
-// gnuplot fails.
+// needle_bend.csv, needle_step.csv, needle_bend.svg, needle_thesis.svg. Throws std::runtime_error or report::ReportError when the folder
+// cannot be written or gnuplot fails.
 void write(const std::filesystem::path& folder, const std::vector<BendRow>& bends, const std::vector<StepRow>& steps);
 
 }  // namespace trocar::bench

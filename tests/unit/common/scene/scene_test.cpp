@@ -170,7 +170,7 @@ TEST_F(SceneTest, NeedsNeitherNeedleNorContact) {
       read_scene(write(text + "[needle]\nmodel = \"thesis\"\nlength_m = 0.15\nouter_m = 0.0009\ninner_m = 0.0006\nyoung_pa = 2e11\n"));
   EXPECT_EQ(needle.needle->model, NeedleModel::Thesis);
   expect_parts(error_from([&] { require_insertion(needle); }), {"file.toml:", "needle.model = \"thesis\"", "write \"beam\""});
-  EXPECT_EQ(needle.needle->elements, 24);
+  EXPECT_EQ(needle.needle->elements, 15);  // 16 nodes along the needle, as printed
   EXPECT_EQ(needle.needle->inner_m, 0.0006);
 }
 
@@ -324,6 +324,20 @@ TEST_F(SceneTest, ReadsWhatANeedleIsMadeOf) {
   refuses("gauge = \"20G\"\nlenght = 65\n", {"needle.lenght", "unknown key"});
   expect_parts(error_of("[needle]\nmodel = \"rigid\"\nlength_m = 0.1\n", [](const auto& file) { return beam_of(read_needle(file)); }),
                {"file.toml:2: needle.model = \"rigid\"", "write \"beam\""});
+}
+
+TEST_F(SceneTest, ReadsTheTrianglesOfTheThesis) {
+  const auto with = [&](const std::string& keys) {
+    return triangles_of(read_needle(write("[needle]\nmodel = \"thesis\"\nlength_m = 0.15\ngauge = \"20G\"\n" + keys)));
+  };
+  const fem::ThesisNeedleProperties steel = with("");
+  EXPECT_EQ(steel.elements, 15);
+  EXPECT_EQ(steel.depth_m, 0.908e-3);
+  EXPECT_EQ(steel.thickness_m, 0.908e-3);
+  EXPECT_NEAR(steel.young_pa, 674e6, 1e6);
+  EXPECT_NEAR(with("material = \"nitinol\"\n").young_pa / steel.young_pa, 0.375, 1e-8);
+  EXPECT_EQ(with("young_pa = 980e6\nelements = 40\n").young_pa, 980e6);
+  EXPECT_EQ(with("young_pa = 980e6\nelements = 40\n").elements, 40);
 }
 
 TEST_F(SceneTest, RefusesWhatCannotBeComputed) {
