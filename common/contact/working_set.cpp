@@ -55,7 +55,7 @@ void WorkingSet::clear() noexcept {
   tip_cell_ = -1;
   tip_inside_ = false;
   path_m_ = deepest_m_ = 0.0;
-  tip_excess_n_per_m_ = 0.0;
+  cutting_n_per_m_ = 0.0;
   softened_ = capacity::contacts;
 }
 
@@ -213,7 +213,7 @@ bool WorkingSet::place(const Vector2& x_m) noexcept {
   return true;
 }
 
-void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) noexcept {
+void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept {
   const std::size_t n = size();
   if (law_->explicit_count > 0) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -222,7 +222,7 @@ void WorkingSet::set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<
     }
     return;
   }
-  const double excess = tip_excess_n_per_m_ = std::max(0.0, tip_n_per_m - shaft_n_per_m);
+  const double excess = std::max(0.0, tip_n_per_m - shaft_n_per_m);
   const double zone_begins = deepest_m_ - law_->tip_zone_m;
   const bool nodes = law_->method != Method::Embedded;
   double begins = nodes ? 0.0 : point_[0].path_m;
@@ -263,7 +263,7 @@ double WorkingSet::reach(const Vector2& from_m, std::int32_t cell, const Vector2
 double WorkingSet::aside_m(double length_m, const Vector2& direction) const noexcept {
   const std::size_t i = size() - 1;
   const Point& last = point_[i];
-  const double full_n = std::abs(tip_lateral_) * tip_excess_n_per_m_ * std::min(law_->tip_zone_m, path_m_);
+  const double full_n = std::abs(tip_lateral_) * cutting_n_per_m_ * std::min(law_->tip_zone_m, path_m_);
   if (full_n == 0.0) return 0.0;
   const double side = std::copysign(1.0, face_rad_);
   const Vector2 n{-side * direction[1], side * direction[0]};

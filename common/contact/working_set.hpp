@@ -89,7 +89,9 @@ class WorkingSet {
   [[nodiscard]] bool place(const Vector2& x_m) noexcept;
 
   // Upper and lower bounds of every contact's axial force from the two densities.
-  void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) noexcept;
+  void set_bounds(double shaft_n_per_m, double tip_n_per_m, std::span<Target> target) const noexcept;
+  // The force per length that cuts, by which a bevelled tip is carried aside in the next follow().
+  void set_cutting(double excess_n_per_m) noexcept { cutting_n_per_m_ = excess_n_per_m; }
 
   [[nodiscard]] bool in_tissue(const Vector2& x_m) const noexcept { return geometry_.locate(x_m, -1) >= 0; }
   // Turns the soft tie of the last segment into the frame of this tick. Before every solve.
@@ -141,7 +143,7 @@ class WorkingSet {
   const Law* law_{nullptr};
   double face_rad_{};
   double tip_lateral_{};
-  double tip_excess_n_per_m_{};  // by which the tip's density is above the shaft's
+  double cutting_n_per_m_{};
   double regularisation_{};
   double least_compliance_{};
   Geometry geometry_{};

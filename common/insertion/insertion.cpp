@@ -181,6 +181,7 @@ Result Insertion::step(const Pose& base, double dt_s) noexcept {
 
   if (set_.size() > 0 || !skip_) {
     if (set_.size() > 0) set_.soften_last(tip_axis_);
+    set_.set_cutting(std::max(0.0, tip_n_per_m_ - shaft_n_per_m_));
     set_.set_bounds(shaft_n_per_m_, tip_n_per_m_, {target_.data(), set_.size()});
     if (bends_)
       solve_bending(result);
