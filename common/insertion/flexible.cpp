@@ -56,6 +56,7 @@ bool Flexible::linearise(needle::Tangent tangent, const contact::WorkingSet& set
   const needle::Factor factor = beam_.linearise(tangent);
   if (factor.status != needle::Status::Ok) return false;
   beam_negative_ = factor.negative_pivots;
+  convex_ = tangent == needle::Tangent::Convex;
   joined_.join(set.solver(), beam_.flexibility(), needle::Beam::most_loads);
   return true;
 }
@@ -83,13 +84,29 @@ double Flexible::residual_n(const contact::WorkingSet& set, std::span<const cont
 bool Flexible::iterate(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept {
   const std::size_t n = set.size();
   contact::Solver& tissue = set.solver();
+  if (!aim(set, target, outcome)) return false;
+  if (!convex_ && joined_.negative_pivots() != beam_negative_) {
+    // No least energy lies this way.
+    if (!linearise(needle::Tangent::Convex, set) || !aim(set, target, outcome)) return false;
+  }
+  for (std::size_t i = 0; i < n; ++i) contact_[i] = joined_.contact(i);
+  tissue.assume({contact_.data(), n});
+  take(set);
+  if (beam_.apply({load_.data(), n}).status != needle::Status::Ok) return false;
+  outcome.residual_n = std::max(residual_n(set, target), outcome.solved_n);
+  return true;
+}
+
+// Solves the contacts of the linearised whole.
+bool Flexible::aim(const contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept {
+  const std::size_t n = set.size();
   for (std::size_t i = 0; i < n; ++i) {
     const Vector2 p = beam_.position_m(i);
     const Vector2 c = beam_.correction_m(i);
     const Vector2 t = tangent_at(beam_.theta_rad(i));
     const double moved_m = anchor_m_[i] - load_[i].arclength_m;
     const Vector2& x = set.point(i).material_m;
-    const Vector2 u = tissue.displacement_m(i);
+    const Vector2 u = set.solver().displacement_m(i);
     const Vector2 both = joined_.displacement_m(i);  // (G + B) f
     target[i].tangent = t;
     for (std::size_t k = 0; k < 2; ++k) target[i].gap_m[k] = p[k] + c[k] + moved_m * t[k] - x[k] + (both[k] - u[k]);
@@ -98,32 +115,8 @@ bool Flexible::iterate(contact::WorkingSet& set, std::span<contact::Target> targ
   outcome.pivots += solution.pivots;
   outcome.solves += solution.iterations;
   outcome.contacts = solution.status;
-  if (solution.status == contact::SolverStatus::NotFinite) return false;
-  for (std::size_t i = 0; i < n; ++i) contact_[i] = joined_.contact(i);
-  tissue.assume({contact_.data(), n});
-  take(set);
-  if (beam_.apply({load_.data(), n}).status != needle::Status::Ok) return false;
-  outcome.residual_n = std::max(residual_n(set, target), solution.residual_n);
-  return true;
-}
-
-bool Flexible::converge(needle::Tangent tangent, int most, contact::WorkingSet& set, std::span<contact::Target> target,
-                        Outcome& outcome) noexcept {
-  bool fresh = linearise(tangent, set);
-  if (!fresh) return false;
-  double last_n = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < most; ++k) {
-    ++outcome.iterations;
-    if (!iterate(set, target, outcome)) return false;
-    if (outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm) return true;
-    if (outcome.residual_n * gain > last_n) {
-      if (!linearise(tangent, set)) return false;
-    } else {
-      beam_.correct();
-    }
-    last_n = outcome.residual_n;
-  }
-  return false;
+  outcome.solved_n = solution.residual_n;
+  return solution.status != contact::SolverStatus::NotFinite;
 }
 
 Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet& set, std::span<contact::Target> target) noexcept {
@@ -135,12 +128,7 @@ Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet&
     anchor_m_[i] = set.point(i).arclength_m;
   }
   start(base, set);
-  outcome.converged =
-      converge(needle::Tangent::Exact, exact_iterations, set, target, outcome) && joined_.negative_pivots() == beam_negative_;
-  if (!outcome.converged) {
-    start(base, set);
-    outcome.converged = converge(needle::Tangent::Convex, max_iterations - outcome.iterations, set, target, outcome);
-  }
+  outcome.converged = converge(set, target, outcome);
   if (outcome.converged) {
     for (std::size_t i = 0; i < n; ++i) set.point(i).arclength_m = load_[i].arclength_m;
     return outcome;
@@ -149,6 +137,23 @@ Flexible::Outcome Flexible::solve(const needle::Pose& base, contact::WorkingSet&
   for (std::size_t i = 0; i < n; ++i) before_[i].slip_m = 0.0;
   start(base, set);
   return outcome;
+}
+
+bool Flexible::converge(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept {
+  if (!linearise(needle::Tangent::Exact, set)) return false;
+  double last_n = std::numeric_limits<double>::infinity();
+  while (outcome.iterations < max_iterations) {
+    ++outcome.iterations;
+    if (!iterate(set, target, outcome)) return false;
+    if (outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm) return true;
+    if (convex_ || outcome.residual_n * gain > last_n) {
+      if (!linearise(needle::Tangent::Exact, set)) return false;
+    } else {
+      beam_.correct();
+    }
+    last_n = outcome.residual_n;
+  }
+  return false;
 }
 
 }  // namespace trocar::insertion

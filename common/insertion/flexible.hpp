@@ -28,7 +28,7 @@ using Jacobian = std::array<std::array<double, 3>, 3>;
 
 class Flexible {
  public:
-  static constexpr int max_iterations = 16;   // of Newton
+  static constexpr int max_iterations = 24;   // of Newton
   static constexpr int exact_iterations = 8;  // after which, or when they arrive at no stable state, the convex tangent is tried
   static constexpr double gain = 10.0;
   static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
@@ -40,7 +40,8 @@ class Flexible {
     int iterations{};  // of Newton
     int pivots{};
     int solves{};
-    double residual_n{};
+    double solved_n{};    // residual of the contacts alone, in the frames that they were solved in
+    double residual_n{};  // of the whole
   };
 
   void open(const model::Needle& needle) noexcept;
@@ -63,13 +64,15 @@ class Flexible {
   void start(const needle::Pose& base, contact::WorkingSet& set) noexcept;
   bool linearise(needle::Tangent tangent, const contact::WorkingSet& set) noexcept;
   bool iterate(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
-  bool converge(needle::Tangent tangent, int most, contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
+  bool aim(const contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
+  bool converge(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
   void take(const contact::WorkingSet& set) noexcept;
   [[nodiscard]] double residual_n(const contact::WorkingSet& set, std::span<const contact::Target> target) const noexcept;
 
   needle::Beam beam_{};
   contact::Solver joined_{};  // G + B
   int beam_negative_{};       // negative eigenvalues of K
+  bool convex_{};             // the last linearisation
   std::array<needle::Load, capacity::contacts + 1> load_{};
   std::array<double, capacity::contacts> anchor_m_{};
   std::array<contact::Contact, capacity::contacts> contact_{}, before_{};
