@@ -190,7 +190,7 @@ TEST(NeedleStress, HardSteering) {
     Steered needle(soft(), soft().law, tube_22g());
     steer(needle, {.jump_m = jump_m}, 4, counts(10'000, 500'000));
     expect_sound(needle.seen(), jump_m > 0.0 ? "jumps" : "smooth");
-    EXPECT_LE(needle.seen().unsolved, needle.seen().ticks / (jump_m > 0.0 ? 100 : 1000));
+    EXPECT_EQ(needle.seen().unsolved, 0);
   }
 }
 
@@ -200,9 +200,8 @@ TEST(NeedleStress, StiffnessFromFarBelowTheTissuesToFarAboveSteel) {
     Steered needle(soft(), soft().law, tube_22g(std::pow(10.0, decade) * tissue_pa));
     steer(needle, ordinary, 5, counts(3'000, 100'000));
     expect_sound(needle.seen(), "ratio_1e" + std::to_string(decade));
-    if (decade >= 7) {  // steel is at 8e6
-      EXPECT_EQ(needle.seen().unsolved, 0);
-    }
+    // Steel is at 8e6. Of needles that are softer than that, yet stiff enough to come into the tissue, some ticks find no equilibrium.
+    EXPECT_LE(needle.seen().unsolved, decade <= 1 || decade >= 7 ? 0 : needle.seen().ticks / 5);
   }
 }
 
@@ -225,9 +224,7 @@ TEST(NeedleStress, ThrustFarBeyondBuckling) {
     }
     expect_sound(needle.seen(), "density_" + std::to_string(static_cast<int>(density)));
     EXPECT_GT(most_n, 2.0 * needle.buckling_n());
-    if (density == 1.0) {
-      EXPECT_EQ(needle.seen().unsolved, 0);
-    }
+    EXPECT_LE(needle.seen().unsolved, density < 10.0 ? 0 : needle.seen().ticks / 100);
   }
 }
 
@@ -258,7 +255,7 @@ TEST(NeedleStress, TipAgainstARigidInclusion) {
   }
   expect_sound(needle.seen(), "inclusion");
   EXPECT_GT(most_n, needle.buckling_n());
-  EXPECT_LE(needle.seen().unsolved, needle.seen().ticks / 1000);
+  EXPECT_EQ(needle.seen().unsolved, 0);
 }
 
 TEST(NeedleStress, HalfATurnInTheAir) {

@@ -145,7 +145,7 @@ void Bench::parts_of_a_tick() {
 // A 22G needle about 70 mm deep in a block of soft tissue, 1 kHz: 20 mm/s forward while the base swings sideways, and back again.
 void Bench::coupled_step() {
   reference::GridImage grid({.element = fem::Type::Tri3, .nodes_x = 41, .nodes_y = 41});
-  grid.law.spacing_m = 2.2e-3;
+  grid.law.spacing_m = 2.0e-3;
   model::Image image = grid.image();
   const needle::Section steel = needle::section_of(0.718e-3, 0.413e-3, 200e9);
   image.needle.length_m = 0.1;
@@ -195,7 +195,14 @@ void Bench::coupled_step() {
                            matrix(0, 0) += 1e-9;
                            return timed([&] { sink += cholesky.compute(matrix).matrixLLT()(63, 63); });
                          }},
-                        {"coupled step: needle, 32 contacts, tissue", next}};
+                        {"coupled step: needle, 32 contacts, tissue", next},
+                        {"needle manipulation Jacobian of that step, on demand", [&] {
+                           insertion::Jacobian jacobian{};
+                           bool known = false;
+                           const double seconds = timed([&] { known = model->jacobian(jacobian); });
+                           sink += known ? jacobian[0][0] : std::nan("");
+                           return seconds;
+                         }}};
   measure(rows, options_.turns(40));
   if (!std::isfinite(sink)) throw std::runtime_error("the floor is not finite");
   for (const Row& row : rows) steps_.push_back({row.name, row.median_s, row.quartile_s[0], row.quartile_s[1]});

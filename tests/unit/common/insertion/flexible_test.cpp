@@ -125,6 +125,39 @@ TEST(Flexible, SettlesButForTheTipsPlaceWithEmbeddedContacts) {
   EXPECT_NEAR(first.fx_n / hand.base().fx_n, 1.0, 5e-5);
 }
 
+// An explicit contact that the tip leaves behind stays, on the straight continuation of the bent needle.
+TEST(Flexible, CarriesExplicitContactsBeyondTheTip) {
+  Hand hand(grid_of(fem::Type::Tri3));
+  hand.law().explicit_count = 4;
+  for (std::size_t i = 0; i < 4; ++i) {
+    hand.law().explicit_point_m[i] = {0.0, 0.01 + 0.012 * static_cast<double>(i)};
+    hand.law().explicit_slip_force_n[i] = 0.05;
+  }
+  hand.pose = {0.0, -0.05, std::numbers::pi / 2};  // the tip stands at y = 0.05
+  bend(hand);
+  Seen seen;
+  for (int k = 0; k < 300; ++k) {
+    hand.pose.y_m -= 1e-4;
+    hand.pose.x_m += 1e-5;
+    hand.step();
+    look(seen, hand);
+    ASSERT_FALSE(::testing::Test::HasFatalFailure()) << k;
+  }
+  EXPECT_EQ(hand.result().contacts, 4U);
+  EXPECT_LT(seen.wrench, 1e-9);
+  const needle::Station tip = hand.model().beam().tip();
+  int beyond = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Insertion::ContactReport c = hand.model().contact(i);
+    if (c.arclength_m <= needle_m) continue;
+    ++beyond;
+    const double past_m = c.arclength_m - needle_m;
+    EXPECT_NEAR(c.position_m[0], tip.position_m[0] + past_m * tip.tangent[0], 1e-11);
+    EXPECT_NEAR(c.position_m[1], tip.position_m[1] + past_m * tip.tangent[1], 1e-11);
+  }
+  EXPECT_EQ(beyond, 3);
+}
+
 TEST(Flexible, RefusesAnExplicitContactBesideTheCurvedShaft) {
   Hand hand(grid_of(fem::Type::Tri3));
   hand.law().explicit_count = 1;

@@ -41,11 +41,15 @@ TEST(InsertionNoAllocation, OfANeedleThatBends) {
   hand.image().needle.elements = 24;
   hand.image().needle.bending_nm2 = 2.3e-3;
   hand.image().needle.axial_n = 5e4;
+  hand.image().needle.face_rad = 0.5;
+  hand.image().needle.tip_lateral = 0.5;
   hand.open();
   const std::size_t before = allocations();
   ASSERT_GT(before, 0u);
   hand.move(0.001, 0.05, 0.03);
   const int newton = hand.result().newton;
+  Jacobian jacobian{};
+  ASSERT_TRUE(hand.model().jacobian(jacobian));
   hand.pose.x_m += 0.05;  // far out of what it can follow
   hand.step();
   hand.pose.x_m -= 0.05;
