@@ -41,7 +41,9 @@ std::string_view samples_csv_header() {
          "x_m,y_m,theta_rad,vx_m_s,vy_m_s,omega_rad_s,"
          "setpoint_x_m,setpoint_y_m,setpoint_theta_rad,setpoint_vx_m_s,setpoint_vy_m_s,setpoint_omega_rad_s,"
          "command_fx_n,command_fy_n,command_tau_nm,base_fx_n,base_fy_n,base_tau_nm,"
-         "residual_m,singularity,missed_feedback_ticks,wakeup_late_us,tick_us";
+         "residual_m,singularity,missed_feedback_ticks,wakeup_late_us,tick_us,"
+         "handle_fx_n,handle_fy_n,handle_tau_nm,virtual_x_m,virtual_y_m,virtual_theta_rad,virtual_fx_n,virtual_fy_n,virtual_tau_nm,"
+         "display_energy_j,virtual_contacts,virtual_status";
 }
 
 void append_samples_csv(std::string& out, const trocar::Sample& sample) {
@@ -81,6 +83,14 @@ void append_samples_csv(std::string& out, const trocar::Sample& sample) {
   for (const float value : {sample.wakeup_late_us, sample.tick_us}) {
     comma();
     real(out, value, 9);
+  }
+  reals(sample.handle_wrench);
+  reals(sample.virtual_pose);
+  reals(sample.virtual_wrench);
+  reals(std::array{sample.display_energy_j});
+  for (const std::uint32_t value : {sample.virtual_contacts, std::uint32_t{sample.virtual_status}}) {
+    comma();
+    integer(out, value);
   }
   out += '\n';
 }

@@ -12,7 +12,7 @@
 
 namespace trocar {
 
-inline constexpr std::uint32_t protocol_version = 1;
+inline constexpr std::uint32_t protocol_version = 2;
 
 enum class Mode : std::uint8_t {
   Off,       // drives not operational
@@ -55,7 +55,11 @@ enum class CommandKind : std::uint8_t {
   Stop,         // quick stop, then torque off; anyone may send it
   SelectGains,  // `gain_set` becomes active
   ResetFault,
+  Haptic,  // from rest, the handle becomes the virtual needle's, shown by `display`
 };
+
+// How the virtual needle is shown to the hand (firmware/haptic).
+enum class Display : std::uint8_t { FourChannel, Impedance, Admittance };
 
 enum class ReplyCode : std::uint8_t {
   Accepted,
@@ -72,6 +76,7 @@ enum class ReplyCode : std::uint8_t {
   WrongVersion,
   UnknownGains,
   StillFaulty,  // the cause of the fault persists
+  NoModel,      // Haptic without a model image
 };
 
 // Zero-initialised is harmless: a KeepAlive of no session.
@@ -80,6 +85,7 @@ struct Command {
   std::uint32_t id{};       // increasing within a session; echoed in replies
   CommandKind kind{};
   std::uint8_t gain_set{};              // SelectGains: index into the rig's gain sets
+  Display display{};                    // Haptic
   std::array<double, 3> target_pose{};  // Move: x_m, y_m, theta_rad (unwrapped: 2 pi more is one turn more)
   double speed_m_s{};                   // Move: path speed of translation, > 0
   double angular_speed_rad_s{};         // Move: speed of rotation, > 0
@@ -138,7 +144,14 @@ struct Sample {
   double residual_m{};                     // redundant measurement: coupling length measured minus nominal
   double singularity{};                    // distance to singularity, 0 (singular) … 1
   std::uint32_t missed_feedback{};         // ticks since the last complete feedback
-  float wakeup_late_us{};                  // 0 in lock-step
+  // In Haptic, else NaN and 0: the virtual needle, and the hand as the observer sees it.
+  std::array<double, 3> handle_wrench{};   // N, N, N m of the hand on the handle
+  std::array<double, 3> virtual_pose{};    // of the virtual needle's base
+  std::array<double, 3> virtual_wrench{};  // what its base applies to the needle
+  double display_energy_j{};               // that the display has taken from the hand, less what it gave; the guard keeps it above its bound
+  std::uint32_t virtual_contacts{};
+  std::uint8_t virtual_status{};  // insertion::Status of the virtual needle
+  float wakeup_late_us{};         // 0 in lock-step
   float tick_us{};                         // execution time of the tick, 0 in lock-step
 };
 
@@ -154,14 +167,14 @@ struct Sample {
   return static_cast<std::size_t>(f) < names.size() ? names[static_cast<std::size_t>(f)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(CommandKind k) noexcept {
-  constexpr std::array<const char*, 10> names{"KeepAlive", "Home", "Tare", "Arm",         "Disarm",
-                                              "Move",      "Hold", "Stop", "SelectGains", "ResetFault"};
+  constexpr std::array<const char*, 11> names{"KeepAlive", "Home", "Tare",        "Arm",        "Disarm", "Move",
+                                              "Hold",      "Stop", "SelectGains", "ResetFault", "Haptic"};
   return static_cast<std::size_t>(k) < names.size() ? names[static_cast<std::size_t>(k)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(ReplyCode c) noexcept {
-  constexpr std::array<const char*, 14> names{"Accepted",  "Done",         "Stopped",      "WrongMode",  "SessionTaken",
-                                              "NoSession", "NotHomed",     "NotAtRest",    "OutOfRange", "UnreachablePose",
-                                              "Expired",   "WrongVersion", "UnknownGains", "StillFaulty"};
+  constexpr std::array<const char*, 15> names{"Accepted",  "Done",         "Stopped",      "WrongMode",   "SessionTaken",
+                                              "NoSession", "NotHomed",     "NotAtRest",    "OutOfRange",  "UnreachablePose",
+                                              "Expired",   "WrongVersion", "UnknownGains", "StillFaulty", "NoModel"};
   return static_cast<std::size_t>(c) < names.size() ? names[static_cast<std::size_t>(c)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(EventKind k) noexcept {

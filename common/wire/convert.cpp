@@ -21,7 +21,8 @@ std::string_view text_of(const char (&text)[N]) noexcept {
   return {text, strnlen(text, N)};
 }
 
-constexpr std::uint8_t last_command = static_cast<std::uint8_t>(CommandKind::ResetFault);
+constexpr std::uint8_t last_command = static_cast<std::uint8_t>(CommandKind::Haptic);
+constexpr std::uint8_t last_display = static_cast<std::uint8_t>(Display::Admittance);
 
 }  // namespace
 
@@ -58,6 +59,12 @@ Sample to_wire(const trocar::Sample& sample) noexcept {
   out.missed_feedback = sample.missed_feedback;
   out.wakeup_late_us = sample.wakeup_late_us;
   out.tick_us = sample.tick_us;
+  copy(out.handle_wrench, sample.handle_wrench);
+  copy(out.virtual_pose, sample.virtual_pose);
+  copy(out.virtual_wrench, sample.virtual_wrench);
+  out.display_energy_j = sample.display_energy_j;
+  out.virtual_contacts = sample.virtual_contacts;
+  out.virtual_status = sample.virtual_status;
   return out;
 }
 
@@ -84,6 +91,12 @@ trocar::Sample from_wire(const Sample& sample) noexcept {
   out.missed_feedback = sample.missed_feedback;
   out.wakeup_late_us = sample.wakeup_late_us;
   out.tick_us = sample.tick_us;
+  copy(out.handle_wrench, sample.handle_wrench);
+  copy(out.virtual_pose, sample.virtual_pose);
+  copy(out.virtual_wrench, sample.virtual_wrench);
+  out.display_energy_j = sample.display_energy_j;
+  out.virtual_contacts = sample.virtual_contacts;
+  out.virtual_status = sample.virtual_status;
   return out;
 }
 
@@ -152,12 +165,14 @@ Command to_wire(const trocar::Command& command, std::string_view gain_set, std::
   out.speed_m_s = command.speed_m_s;
   out.angular_speed_rad_s = command.angular_speed_rad_s;
   out.stop_force_n = command.stop_force_n;
+  out.display = static_cast<std::uint8_t>(command.display);
   return out;
 }
 
 ReplyCode from_wire(const Command& command, std::span<const std::string_view> gain_sets, std::int64_t now_ns,
                     trocar::Command& out) noexcept {
-  if (command.protocol != protocol_version || command.kind > last_command) return ReplyCode::WrongVersion;
+  if (command.protocol != protocol_version || command.kind > last_command || command.display > last_display)
+    return ReplyCode::WrongVersion;
   // Compared without adding, so that a hostile sent_ns cannot overflow.
   const std::int64_t allowed_ns = std::int64_t{command.deadline_ms} * 1'000'000;
   if (command.deadline_ms != 0 && command.sent_ns < now_ns - allowed_ns) return ReplyCode::Expired;
@@ -175,6 +190,7 @@ ReplyCode from_wire(const Command& command, std::span<const std::string_view> ga
   out.speed_m_s = command.speed_m_s;
   out.angular_speed_rad_s = command.angular_speed_rad_s;
   out.stop_force_n = command.stop_force_n;
+  out.display = static_cast<Display>(command.display);
   return ReplyCode::Accepted;
 }
 

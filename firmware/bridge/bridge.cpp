@@ -57,6 +57,8 @@ std::string refusal(ReplyCode code, Mode mode) {
       return "no such gain set in the rig file";
     case ReplyCode::StillFaulty:
       return "the drives are not operational yet";
+    case ReplyCode::NoModel:
+      return "no virtual needle: start trocar-rig with --model IMAGE (trocar scene compile makes one)";
   }
   return {};
 }

@@ -39,6 +39,12 @@ inline trocar::Sample sample(std::uint64_t tick) {
   s.missed_feedback = static_cast<std::uint32_t>(tick % 5);
   s.wakeup_late_us = 0.1f * static_cast<float>(tick);
   s.tick_us = 12.3f;
+  for (auto* a : {&s.handle_wrench, &s.virtual_pose, &s.virtual_wrench}) {
+    for (auto& v : *a) v = std::sin(next += 1.0);
+  }
+  s.display_energy_j = std::sin(next += 1.0);
+  s.virtual_contacts = static_cast<std::uint32_t>(tick % 40);
+  s.virtual_status = static_cast<std::uint8_t>(tick % 3);
   return s;
 }
 

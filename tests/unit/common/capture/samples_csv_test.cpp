@@ -58,6 +58,12 @@ TEST(SamplesCsv, EveryNumberReadsBackToTheSameValueUnderItsName) {
   EXPECT_EQ(std::stoul(cell["missed_feedback_ticks"]), s.missed_feedback);
   EXPECT_EQ(std::strtof(cell["wakeup_late_us"].c_str(), nullptr), s.wakeup_late_us);
   EXPECT_EQ(std::strtof(cell["tick_us"].c_str(), nullptr), s.tick_us);
+  EXPECT_EQ(real("handle_fy_n"), s.handle_wrench[1]);
+  EXPECT_EQ(real("virtual_theta_rad"), s.virtual_pose[2]);
+  EXPECT_EQ(real("virtual_tau_nm"), s.virtual_wrench[2]);
+  EXPECT_EQ(real("display_energy_j"), s.display_energy_j);
+  EXPECT_EQ(std::stoul(cell["virtual_contacts"]), s.virtual_contacts);
+  EXPECT_EQ(std::stoul(cell["virtual_status"]), s.virtual_status);
 }
 
 TEST(SamplesCsv, PrintsAsPrintfWithSeventeenDigits) {
@@ -68,13 +74,13 @@ TEST(SamplesCsv, PrintsAsPrintfWithSeventeenDigits) {
     std::string row;
     append_samples_csv(row, s);
     char expected[64];
-    std::snprintf(expected, sizeof expected, ",%.17g,0,0,0,0\n", value);
+    std::snprintf(expected, sizeof expected, ",%.17g,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", value);
     EXPECT_TRUE(row.ends_with(expected)) << row << expected;
   }
   s.residual_m = -std::numeric_limits<double>::quiet_NaN();
   std::string row;
   append_samples_csv(row, s);
-  EXPECT_TRUE(row.ends_with(",nan,0,0,0,0\n")) << row;
+  EXPECT_TRUE(row.ends_with(",nan,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n")) << row;
 }
 
 TEST(SamplesCsv, EqualSamplesGiveEqualBytesAndGapsStayGaps) {

@@ -31,6 +31,12 @@ Sample distinct_sample() {
   s.missed_feedback = 9;
   s.wakeup_late_us = 1.5f;
   s.tick_us = 2.5f;
+  for (auto* a : {&s.handle_wrench, &s.virtual_pose, &s.virtual_wrench}) {
+    for (auto& v : *a) v = next += 1;
+  }
+  s.display_energy_j = next += 1;
+  s.virtual_contacts = 11;
+  s.virtual_status = 7;
   return s;
 }
 
@@ -59,6 +65,12 @@ TEST(Convert, SampleSurvivesTheRoundTripFieldByField) {
   EXPECT_EQ(r.missed_feedback, s.missed_feedback);
   EXPECT_EQ(r.wakeup_late_us, s.wakeup_late_us);
   EXPECT_EQ(r.tick_us, s.tick_us);
+  EXPECT_EQ(r.handle_wrench, s.handle_wrench);
+  EXPECT_EQ(r.virtual_pose, s.virtual_pose);
+  EXPECT_EQ(r.virtual_wrench, s.virtual_wrench);
+  EXPECT_EQ(r.display_energy_j, s.display_energy_j);
+  EXPECT_EQ(r.virtual_contacts, s.virtual_contacts);
+  EXPECT_EQ(r.virtual_status, s.virtual_status);
 }
 
 TEST(Convert, WireSampleNamesTheSameFieldsAsTheContract) {
@@ -98,6 +110,7 @@ TEST(Convert, CommandSurvivesTheRoundTripAndFindsItsGainSetByName) {
   c.speed_m_s = 4;
   c.angular_speed_rad_s = 5;
   c.stop_force_n = 6;
+  c.display = Display::Admittance;
   Command out;
   ASSERT_EQ(wire::from_wire(wire::to_wire(c, "thesis", 1000, 50), gain_sets, 1000, out), ReplyCode::Accepted);
   EXPECT_EQ(out.session, c.session);
@@ -108,6 +121,7 @@ TEST(Convert, CommandSurvivesTheRoundTripAndFindsItsGainSetByName) {
   EXPECT_EQ(out.speed_m_s, c.speed_m_s);
   EXPECT_EQ(out.angular_speed_rad_s, c.angular_speed_rad_s);
   EXPECT_EQ(out.stop_force_n, c.stop_force_n);
+  EXPECT_EQ(out.display, c.display);
   EXPECT_EQ(wire::from_wire(wire::to_wire(c, "nobody", 1000, 50), gain_sets, 1000, out), ReplyCode::UnknownGains);
 }
 
@@ -124,9 +138,12 @@ TEST(Convert, CommandExpiresJustAfterItsDeadline) {
 TEST(Convert, RefusesForeignProtocolAndUnknownCommandAndNamesBothVersions) {
   wire::Command c = wire::to_wire(Command{}, "", 0, 0);
   Command out;
-  c.kind = 10;
+  c.kind = 11;
   EXPECT_EQ(wire::from_wire(c, gain_sets, 0, out), ReplyCode::WrongVersion);
   c.kind = 0;
+  c.display = 3;
+  EXPECT_EQ(wire::from_wire(c, gain_sets, 0, out), ReplyCode::WrongVersion);
+  c.display = 0;
   c.protocol = protocol_version + 1;
   EXPECT_EQ(wire::from_wire(c, gain_sets, 0, out), ReplyCode::WrongVersion);
 
