@@ -1,6 +1,8 @@
 #include "common/capture/cdr.hpp"
 
 #include <gtest/gtest.h>
+
+#include <cstring>
 #include <unistd.h>
 
 #include <memory>
@@ -125,9 +127,11 @@ TEST(Cdr, SamplesCutFromABatchKeepFieldsThatANewerWriterAppended) {
   batch->push(example::sample(8));
   auto cdr = serialise(batch->message(6));
   cdr.insert(cdr.end(), {std::byte{1}, std::byte{2}, std::byte{3}, std::byte{4}});
-  for (const std::size_t delimiter : {4u, 20u, 28u}) {  // of batch, sequence and sample, all without a carry
-    ASSERT_LT(std::to_integer<int>(cdr[delimiter]), 252);
-    cdr[delimiter] = static_cast<std::byte>(std::to_integer<int>(cdr[delimiter]) + 4);
+  for (const std::size_t delimiter : {4u, 20u, 28u}) {  // of batch, sequence and sample
+    std::uint32_t size = 0;
+    std::memcpy(&size, &cdr[delimiter], sizeof size);
+    size += 4;
+    std::memcpy(&cdr[delimiter], &size, sizeof size);
   }
   const auto cut = capture::split_batch(cdr);
   ASSERT_EQ(cut.size(), 1u);
