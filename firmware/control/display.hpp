@@ -9,12 +9,11 @@
 // Impedance begins glides to zero.
 #pragma once
 
+#include "common/core/contracts.hpp"
 #include "firmware/control/fade.hpp"
 #include "firmware/control/four_channel.hpp"
 
 namespace trocar::control {
-
-enum class Display : std::uint8_t { Impedance, Admittance, FourChannel };
 
 struct AdmittanceConfig {
   VirtualSlave slave{};                                               // M_v, B_v
