@@ -148,11 +148,11 @@ struct Sample {
   std::array<double, 3> handle_wrench{};   // N, N, N m of the hand on the handle
   std::array<double, 3> virtual_pose{};    // of the virtual needle's base
   std::array<double, 3> virtual_wrench{};  // what its base applies to the needle
-  double display_energy_j{};               // that the display has taken from the hand, less what it gave; the guard keeps it above its bound
+  double display_energy_j{};  // that the display has taken from the hand, less what it gave; the guard keeps it above its bound
   std::uint32_t virtual_contacts{};
   std::uint8_t virtual_status{};  // insertion::Status of the virtual needle
   float wakeup_late_us{};         // 0 in lock-step
-  float tick_us{};                         // execution time of the tick, 0 in lock-step
+  float tick_us{};                // execution time of the tick, 0 in lock-step
 };
 
 [[nodiscard]] constexpr const char* to_string(Mode m) noexcept {

@@ -16,6 +16,7 @@ enum class Trigger : std::uint8_t {
   LinkDown,       // drives left operation while there was no torque
   TorqueEnabled,  // the drives confirmed an Arm command
   MoveAccepted,
+  HapticAccepted,
   HoldAsked,       // hold command, or the armed host went silent
   TorqueOffAsked,  // disarm command, or a stop that has come to rest
   FaultRaised,
@@ -35,16 +36,20 @@ inline constexpr std::array transitions{
     Transition{Mode::Ready, Trigger::TorqueEnabled, Mode::Armed},
     Transition{Mode::Ready, Trigger::FaultRaised, Mode::Fault},  // while enabling torque
     Transition{Mode::Armed, Trigger::MoveAccepted, Mode::Position},
+    Transition{Mode::Armed, Trigger::HapticAccepted, Mode::Haptic},
     Transition{Mode::Armed, Trigger::HoldAsked, Mode::Hold},
     Transition{Mode::Armed, Trigger::TorqueOffAsked, Mode::Ready},
     Transition{Mode::Armed, Trigger::FaultRaised, Mode::Fault},
+    Transition{Mode::Position, Trigger::HapticAccepted, Mode::Haptic},
     Transition{Mode::Position, Trigger::HoldAsked, Mode::Hold},
     Transition{Mode::Position, Trigger::TorqueOffAsked, Mode::Ready},
     Transition{Mode::Position, Trigger::FaultRaised, Mode::Fault},
+    Transition{Mode::Haptic, Trigger::HapticAccepted, Mode::Haptic},  // another display
     Transition{Mode::Haptic, Trigger::HoldAsked, Mode::Hold},
     Transition{Mode::Haptic, Trigger::TorqueOffAsked, Mode::Ready},
     Transition{Mode::Haptic, Trigger::FaultRaised, Mode::Fault},
     Transition{Mode::Hold, Trigger::MoveAccepted, Mode::Position},
+    Transition{Mode::Hold, Trigger::HapticAccepted, Mode::Haptic},
     Transition{Mode::Hold, Trigger::TorqueOffAsked, Mode::Ready},
     Transition{Mode::Hold, Trigger::FaultRaised, Mode::Fault},
     Transition{Mode::Fault, Trigger::FaultReset, Mode::Off},  // Ready follows with the next tick if the drives are operational
