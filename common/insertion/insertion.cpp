@@ -245,7 +245,7 @@ void Insertion::solve_rigid(Result& result) noexcept {
 
 void Insertion::solve_bending(Result& result) noexcept {
   const Flexible::Outcome outcome = flexible_.solve(pose_, set_, {target_.data(), set_.size()});
-  result.status = worst(result.status, outcome.converged ? status_of(outcome.contacts) : Status::NotConverged);
+  result.status = worst(result.status, outcome.converged ? Status::Ok : Status::NotConverged);
   result.pivots = outcome.pivots;
   result.iterations = outcome.solves;
   result.newton = outcome.iterations;
