@@ -129,6 +129,18 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
     if (cell_at(c.node_m, c.cell, c.buckets, x) < 0)
       throw fem::Error(fmt::format("contact.points_m[{}] = ({}, {}) m lies outside of the tissue{}; move it inside", i, x[0], x[1],
                                    scene.corridor ? " in contact.corridor" : ""));
+    const auto& cell = c.cell[static_cast<std::size_t>(cell_at(c.node_m, c.cell, c.buckets, x))];
+    const auto held = [&](std::uint32_t node) { return (c.flags[node] & model::fixed_x) != 0 && (c.flags[node] & model::fixed_y) != 0; };
+    bool all = true;
+    bool on_one = false;
+    for (std::size_t k = 0; k < cell.count; ++k) {
+      const auto& at = c.node_m[cell.node[k]];
+      all = all && held(cell.node[k]);
+      on_one = on_one || (held(cell.node[k]) && std::hypot(at[0] - x[0], at[1] - x[1]) < 1e-6 * c.edge_length_m);
+    }
+    if (all || on_one)
+      throw fem::Error(
+          fmt::format("contact.points_m[{}] = ({}, {}) m lies on supported tissue, which cannot give way; move it", i, x[0], x[1]));
   }
   // A node method makes a contact where the needle crosses an edge.
   const bool nodes = plan.law.method != contact::Method::Embedded;

@@ -148,7 +148,8 @@ void Solver::join(const Solver& tissue, std::span<const double> softness, std::s
   evaluate();
 }
 
-int Solver::negative_pivots() const noexcept {
+int Solver::negative_pivots() noexcept {
+  factorise();
   return static_cast<int>(std::count_if(inverse_pivot_.begin(), inverse_pivot_.begin() + static_cast<std::ptrdiff_t>(valid_),
                                         [](double inverse) { return inverse < 0.0; }));
 }

@@ -84,7 +84,7 @@ class Solver {
   // outlives turns up to frame_slack, the refinement takes the difference. No push, replace or pop until clear().
   void join(const Solver& tissue, std::span<const double> softness, std::size_t part) noexcept;
   static constexpr double frame_slack = 1e-3;
-  [[nodiscard]] int negative_pivots() const noexcept;  // of the last factor: negative eigenvalues of M
+  [[nodiscard]] int negative_pivots() noexcept;  // negative eigenvalues of M, of the present states
   // Takes force, state and slip from elsewhere: u = G f follows at once.
   void assume(std::span<const Contact> contact) noexcept;
   // The compliance of contact i changed: blocks with contacts 0 … i. Forces and states stay.

@@ -270,11 +270,14 @@ double WorkingSet::aside_m(double length_m, const Vector2& direction) const noex
   const Block& own = own_[i];
   const double most_m = full_n * (n[0] * (own[0] * n[0] + own[1] * n[1]) + n[1] * (own[2] * n[0] + own[3] * n[1]));
   const double so_far_m = std::clamp(dot(minus(plus(last.begin_m, scaled(last.heading, length_m)), tip_), n), 0.0, largest_aside * most_m);
-  // Of the last segment, and of the one before as far as the last is too short for it.
+  // By the last segment, and by the one before as far as the last is too short for it. One that pushes the other way, because the needle
+  // tilts, does not count against: the pair would grow beyond all measure.
   const double grown = std::clamp(length_m / law_->spacing_m, 0.0, 1.0);
-  const double held_n = side * (solver_.contact(i).lateral_n + (i > 0 ? (1.0 - grown) * solver_.contact(i - 1).lateral_n : 0.0));
-  const double missing = std::clamp(1.0 + held_n / full_n, 0.0, 1.0);
-  return side * (so_far_m + missing * std::min((length_m - last.cut_m) * std::abs(face_rad_), largest_aside * most_m));
+  const auto holds = [&](std::size_t k) { return std::max(0.0, -side * solver_.contact(k).lateral_n); };
+  const double held_n = holds(i) + (i > 0 ? (1.0 - grown) * holds(i - 1) : 0.0);
+  const double missing = std::clamp(1.0 - held_n / full_n, 0.0, 1.0);
+  const double added_m = missing * std::min((length_m - last.cut_m) * std::abs(face_rad_), largest_aside * most_m);
+  return side * std::min(so_far_m + added_m, length_m * std::abs(face_rad_));
 }
 
 // The last segment's weights and tie for the length that it has now.

@@ -8,8 +8,10 @@
 //   the frame of the shaft as it now stands, and the beam is in equilibrium: measured afterwards, not with the step.
 //   Warm start: the last tick's bend, forces, states and slips.
 //   Chord method: K, B and the factor of G + B serve until an iteration gains less than a factor of `gain`; then they are made anew.
-//   Under thrust beyond buckling K and B are indefinite and the tissue holds the needle; what is found is stable where G + B has as many
-//   negative eigenvalues as K (Haynsworth). Where Newton does not arrive so, it starts again from the last tick with the convex part of K.
+//   Friction turns with the shaft and loads slide along it; the quick step learns of that an iteration late. Where it contracts slowly, a
+//   very flexible needle, Newton's full step (whole.cpp) takes over once the states stand. Under thrust beyond buckling K and B are
+//   indefinite and the tissue holds the needle; what is found is stable where G + B has as many negative eigenvalues as K (Haynsworth).
+//   Where Newton does not arrive so, it starts again from the last tick with the convex part of K.
 #pragma once
 
 #include <array>
@@ -31,6 +33,9 @@ class Flexible {
   static constexpr int max_iterations = 24;   // of Newton
   static constexpr int exact_iterations = 8;  // after which, or when they arrive at no stable state, the convex tangent is tried
   static constexpr double gain = 10.0;
+  static constexpr double slow = 4.0;          // a gain below this is slow
+  static constexpr double least_nudge_rad = 1e-3;    // out of an unstable equilibrium
+  static constexpr double part_way = 0.25;     // of the base's motion that is tried where the whole of it leads nowhere
   static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
   static constexpr double beam_tolerance_nm = 1e-11;
 
@@ -62,6 +67,12 @@ class Flexible {
 
  private:
   void start(const needle::Pose& base, contact::WorkingSet& set) noexcept;
+  void differentiate(const contact::WorkingSet& set) noexcept;
+  [[nodiscard]] std::array<double, 3> shaft_under(std::size_t i, std::size_t j, const contact::Vector2& f) const noexcept;
+  [[nodiscard]] std::array<double, 3> shaft_by(std::size_t i, std::size_t j, std::size_t k) const noexcept;
+  bool full_step(contact::WorkingSet& set, std::span<const contact::Target> target) noexcept;
+  [[nodiscard]] static contact::Vector2 stands_m(const contact::WorkingSet& set, std::size_t i) noexcept;
+  [[nodiscard]] bool stable() noexcept;
   bool linearise(needle::Tangent tangent, const contact::WorkingSet& set) noexcept;
   bool iterate(contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
   bool aim(const contact::WorkingSet& set, std::span<contact::Target> target, Outcome& outcome) noexcept;
@@ -70,14 +81,23 @@ class Flexible {
   [[nodiscard]] double residual_n(const contact::WorkingSet& set, std::span<const contact::Target> target) const noexcept;
 
   needle::Beam beam_{};
-  contact::Solver joined_{};  // G + B
-  int beam_negative_{};       // negative eigenvalues of K
-  bool convex_{};             // the last linearisation
+  contact::Solver joined_{};    // G + B
+  needle::Pose solved_base_{};  // of the last tick that converged
+  int beam_negative_{};         // negative eigenvalues of K
+  bool convex_{};               // the last linearisation
   std::array<needle::Load, capacity::contacts + 1> load_{};
   std::array<double, capacity::contacts> anchor_m_{};
   std::array<contact::Contact, capacity::contacts> contact_{}, before_{};
   static constexpr std::size_t most_unknowns = 3 * capacity::contacts;
-  std::array<std::array<double, most_unknowns + 3>, most_unknowns> equation_{};  // of jacobian: three right-hand sides behind
+  struct Whole {
+    std::array<std::size_t, capacity::contacts + 1> first{};  // unknown of a contact
+    std::array<bool, capacity::contacts> slips{};
+    std::array<std::array<contact::Vector2, 3>, capacity::contacts> force{};  // that an unknown stands for
+    std::array<needle::Slide, capacity::contacts> slide{};
+    std::array<std::array<double, capacity::needle_loads>, capacity::contacts> turned_by{};
+    std::array<std::array<double, most_unknowns + 3>, most_unknowns> equation{};  // with up to three right-hand sides behind
+  };
+  Whole whole_{};
 };
 
 }  // namespace trocar::insertion

@@ -132,7 +132,14 @@ Insertion::ContactReport Insertion::contact(std::size_t i) const noexcept {
   const contact::Contact& c = set_.solver().contact(i);
   const Vector2 u = set_.solver().displacement_m(i);
   const contact::WorkingSet::Point& p = set_.point(i);
-  return {{p.material_m[0] + u[0], p.material_m[1] + u[1]}, p.arclength_m, c.axial_n, c.lateral_n, c.state};
+  ContactReport report{{p.material_m[0] + u[0], p.material_m[1] + u[1]}, p.arclength_m, c.axial_n, c.lateral_n, c.state};
+  if (bends_) {
+    // In the frame of the shaft as it stands, not as it stood when the contacts were solved.
+    const double theta = flexible_.beam().theta_rad(i);
+    report.axial_n = std::cos(theta) * c.force_n[0] + std::sin(theta) * c.force_n[1];
+    report.lateral_n = std::cos(theta) * c.force_n[1] - std::sin(theta) * c.force_n[0];
+  }
+  return report;
 }
 
 Result Insertion::step(const Pose& base, double dt_s) noexcept {
@@ -245,7 +252,7 @@ void Insertion::solve_rigid(Result& result) noexcept {
 
 void Insertion::solve_bending(Result& result) noexcept {
   const Flexible::Outcome outcome = flexible_.solve(pose_, set_, {target_.data(), set_.size()});
-  result.status = worst(result.status, outcome.converged ? status_of(outcome.contacts) : Status::NotConverged);
+  result.status = worst(result.status, outcome.converged ? Status::Ok : Status::NotConverged);
   result.pivots = outcome.pivots;
   result.iterations = outcome.solves;
   result.newton = outcome.iterations;

@@ -126,13 +126,15 @@ class Beam {
   //   linearise  r_i(f) = position_m(i) + correction_m(i) + sum_j compliance(i, j) (f_j - f_j placed): where the beam's own Newton step
   //              under forces f takes point i. Valid until the next place, solve or apply.
   //   apply      takes that step for the f that the caller chose, shortened to longest_step_rad, and places again under f, at arclengths
-  //              that may have moved meanwhile. As many loads as were placed.
+  //              that may have moved meanwhile. As many loads as were placed. moment_nm: of each load, by which R is about to change.
   //   correct    instead of linearise after an apply: the beam's own step anew, from the K and P of the last linearise (chord method).
   // Points keep the order of the loads. apply returns R at the new place; refused loads leave the last place.
   Result place(const Pose& base, std::span<const Load> loads) noexcept;
   Factor linearise(Tangent tangent = Tangent::Exact) noexcept;
   void correct() noexcept;  // precondition: linearise, then as many loads
-  Result apply(std::span<const Load> loads) noexcept;
+  // Bends the needle to a side, by this angle at the tip: out of an equilibrium that is none to stay in.
+  void nudge(double tip_rad) noexcept;
+  Result apply(std::span<const Load> loads, std::span<const double> moment_nm = {}) noexcept;
 
   // After solve, place or apply.
   [[nodiscard]] std::size_t loads() const noexcept { return count_; }

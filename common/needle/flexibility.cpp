@@ -187,7 +187,16 @@ void Beam::correct() noexcept {
   linear_ = true;
 }
 
-Result Beam::apply(std::span<const Load> loads) noexcept {
+void Beam::nudge(double tip_rad) noexcept {
+  for (std::size_t k = 1; k < nodes_; ++k) {
+    const double part = static_cast<double>(k) / static_cast<double>(nodes_ - 1);
+    bend_[k] += tip_rad * part * (2.0 - part);
+  }
+  linear_ = false;
+  (void)assemble();
+}
+
+Result Beam::apply(std::span<const Load> loads, std::span<const double> moment_nm) noexcept {
   if (!open_) return {Status::NotOpen};
   if (loads.size() != count_ || !known(loads)) return {Status::NotFinite, 0, residual_nm_};
   if (!linear_) {
@@ -203,6 +212,12 @@ Result Beam::apply(std::span<const Load> loads) noexcept {
   }
   change[count_] = 1.0;
   std::array<double, most_nodes> step{};
+  std::array<double, most_nodes> turned{};
+  for (std::size_t j = 0; j < moment_nm.size(); ++j) {
+    const Ranked& at = ranked_[rank_[j]];
+    for (std::size_t a = 0; a < 3; ++a) turned[2 * at.element + a] += at.shape[a] * moment_nm[j];
+  }
+  if (!moment_nm.empty()) back_substitute({turned.data(), nodes_});
   double largest = 0.0;
   double sum = 0.0;
   for (std::size_t k = 1; k < nodes_; ++k) {
@@ -210,7 +225,7 @@ Result Beam::apply(std::span<const Load> loads) noexcept {
     std::array<double, lanes> part{};
     for (std::size_t c = 0; c < stride; c += lanes)
       for (std::size_t lane = 0; lane < lanes; ++lane) part[lane] += row[c + lane] * change[c + lane];
-    step[k] = (part[0] + part[1]) + (part[2] + part[3]);
+    step[k] = (part[0] + part[1]) + (part[2] + part[3]) + turned[k];
     largest = std::max(largest, std::abs(step[k]));
     sum += step[k];
   }

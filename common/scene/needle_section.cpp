@@ -60,6 +60,8 @@ Needle needle_of(const config::Table& table) {
   needle.curvature_per_m = table.number_or("curvature_per_m", 0.0, {-most_curvature, most_curvature}, "1 over the radius, such as 5.0");
   if (thesis && needle.curvature_per_m != 0.0)
     table.fail("curvature_per_m", "the needle of the thesis is straight; remove it, or write model = \"beam\"");
+  if (needle.model == NeedleModel::Rigid && needle.curvature_per_m != 0.0)
+    table.fail("curvature_per_m", "a rigid needle is straight; remove it, or write model = \"beam\"");
   needle.young_stated = table.has("young_pa");
   needle.bevel = bevel_of(table);
 

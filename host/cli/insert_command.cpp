@@ -238,12 +238,17 @@ std::string off_shaft(const scene::Scene& scene, const Pose& base) {
           "contact.points_m: point {} ({}, {}) m lies {:.3g} m behind the base of the first path row (({}, {}) m, theta {} rad); "
           "begin the path with the base in front of all points",
           i + 1, x, y, -axial, base.x_m, base.y_m, base.theta_rad);
-    if (std::abs(lateral) > Insertion::explicit_point_tolerance_m)
+    if (scene.needle->curvature_per_m == 0.0 && std::abs(lateral) > Insertion::explicit_point_tolerance_m)
       return fmt::format(
           "contact.points_m: point {} ({}, {}) m lies {:.3g} m beside the shaft of the first path row (base ({}, {}) m, theta {} rad); "
           "move it onto the shaft, to 1e-9 m",
           i + 1, x, y, std::abs(lateral), base.x_m, base.y_m, base.theta_rad);
   }
+  if (scene.needle->curvature_per_m != 0.0)
+    return fmt::format(
+        "contact.points_m: a point lies beside the shaft of the first path row, which is curved (needle.curvature_per_m = {}); move it "
+        "onto the curved shaft, to 1e-9 m",
+        scene.needle->curvature_per_m);
   return "contact.points_m: a point lies outside of the candidates; widen contact.corridor";
 }
 

@@ -100,6 +100,11 @@ int bend_beam(const NeedleBendOptions& options, const needle::Properties& proper
     throw config::UserError(fmt::format("{}: needle: {}; look at its diameters and young_pa", options.needle.string(), to_string(status)));
   const needle::Result result = beam->solve({}, loads);
   if (result.status != needle::Status::Ok) fail(options, result);
+  for (std::size_t k = 0; k < beam->nodes(); ++k)
+    if (const double stretch = beam->at(beam->node_arclength_m(k)).stretch; !(stretch > 0.0))
+      throw config::UserError(
+          fmt::format("{}: these loads press the needle to nothing (stretch {:.3g} at s = {:.3g} m, EA = {:.3g} N); lower them",
+                      options.needle.string(), stretch, beam->node_arclength_m(k), properties.axial_n));
 
   file.stream() << header;
   for (std::size_t k = 0; k < beam->nodes(); ++k) {

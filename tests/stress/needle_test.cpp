@@ -200,8 +200,8 @@ TEST(NeedleStress, StiffnessFromFarBelowTheTissuesToFarAboveSteel) {
     Steered needle(soft(), soft().law, tube_22g(std::pow(10.0, decade) * tissue_pa));
     steer(needle, ordinary, 5, counts(3'000, 100'000));
     expect_sound(needle.seen(), "ratio_1e" + std::to_string(decade));
-    // Steel is at 8e6. Of needles that are softer than that, yet stiff enough to come into the tissue, some ticks find no equilibrium.
-    EXPECT_LE(needle.seen().unsolved, decade <= 1 || decade >= 7 ? 0 : needle.seen().ticks / 5);
+    // Steel is at 8e6. Softer needles snap from one equilibrium to another, and of those ticks some find none.
+    EXPECT_LE(needle.seen().unsolved, decade >= 7 ? 0 : needle.seen().ticks / 500);
   }
 }
 

@@ -284,6 +284,12 @@ TEST(Compile, RefusesByName) {
         s.contact->method = contact::Method::Snap;
       },
       {"bevel_deg", "embedded", "symmetric"});
+  expect_refusal(
+      [](auto& s) {
+        s.contact->explicit_count = 1;
+        s.contact->explicit_point_m[0] = {0.0, 0.1};
+      },
+      {"contact.points_m[0]", "supported"});
   expect_refusal([](auto& s) { s.contact->method = contact::Method::Subdivide; }, {"subdivide"});
   expect_refusal([](auto& s) { s.contact->method = contact::Method::Adapt; }, {"adapt", "solid"}, solid_scene());
   expect_refusal([](auto& s) { s.tissue.strain = fem::Strain::GreenLagrange; }, {"green_lagrange"});

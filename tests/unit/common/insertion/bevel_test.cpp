@@ -96,6 +96,19 @@ TEST(Bevel, SteersTheSameOnFinerMeshes) {
   EXPECT_LT(std::abs(aside_m[2] - aside_m[1]), 0.2 * std::abs(aside_m[2]));
 }
 
+TEST(Bevel, SteersTheSameWhateverTheStep) {
+  std::vector<double> aside_m;
+  for (const double step_m : {1e-4, 4e-5, 1.3e-5}) {
+    Hand hand(grid_of(fem::Type::Quad4));
+    bevel(hand, thirty_degrees);
+    hand.move(
+        0.0, 0.05, 0.0, 1e-3, [](const Wrench&, const Result& r) { EXPECT_EQ(r.status, Status::Ok); }, step_m);
+    aside_m.push_back(hand.result().tip.x_m - hand.pose.x_m);
+  }
+  EXPECT_NEAR(aside_m[1] / aside_m[0], 1.0, 0.03);
+  EXPECT_NEAR(aside_m[2] / aside_m[0], 1.0, 0.03);
+}
+
 // A needle that does not give way. The segments make the force swing about the cutting one's share, less on a finer mesh.
 TEST(Bevel, HoldsTheLateralForceOfTheCuttingOneOnARigidNeedle) {
   reference::GridImage grid({.nodes_x = 61, .nodes_y = 61});
