@@ -1,7 +1,7 @@
 // Wrench of the hand on the handle, and joint velocities, from encoders and motor torques (thesis A.2): one observer for each linkage.
 //   D(theta) theta'' + C(theta, theta') theta' = tau - tau_f(theta') + r,   r = J^T f, f the force of the rest on the end point
 // The rigid handle (mass m, centre of mass a of the coupling's length from P0, inertia I) is for both linkages the same as masses
-// (1-a) m at P0 and a m at P1, and a spare inertia S = I - m a (1-a) coupling^2 about nothing in particular. With those masses in D,
+// (1-a) m at P0 and a m at P1, and a pure inertia, the spare S = I - m a (1-a) coupling^2. With those masses in D,
 //   wrench = H^T (r_0, r_1) + (0, 0, S theta'')     H = J_e^-1 J_o of twin.hpp; it exists at parallel singularities too
 // Forces along the coupling are in r and not in H^T r. Signs: the wrench is what the hand applies to the mechanism (f_x, f_y in N, moment
 // about the handle in N m); a push to +x reads +f_x. The thesis prints the feedback with the other sign, with which it diverges.

@@ -52,7 +52,7 @@ Machine as_built(const rig::Rig& rig, const rig::Rig& own, const sim_plant::Plan
 
 // The plant file taken literally, as the simulated plant does: friction of the geared machine in the direct drive, ten times the rig's.
 Machine geared_friction(const rig::Rig& rig, const sim_plant::PlantConfig& plant) {
-  return {"geared rubs", {sim_plant::imperfect(rig.twin, plant.imperfection), plant.friction, stops(rig)}, plant.current_loop_hz};
+  return {"gear friction", {sim_plant::imperfect(rig.twin, plant.imperfection), plant.friction, stops(rig)}, plant.current_loop_hz};
 }
 
 void run_course(const Course& course, rig::Rig rig, const std::vector<double>& bandwidths, std::vector<Trial>& rows) {
@@ -70,7 +70,7 @@ void run_course(const Course& course, rig::Rig rig, const std::vector<double>& b
 
 std::vector<TraceRow> trace_of(const Course& course, const rig::Rig& rig) {
   std::vector<Estimator> estimators;
-  for (const std::string& method : methods) estimators.push_back(estimator(method, rig, 450.0));
+  for (const std::string& method : methods) estimators.push_back(estimator(method, rig, 390.0));
   const double from = course.steps[2].time_s - 0.02;
   std::vector<TraceRow> trace;
   for (const Sample& sample : course.samples) {
@@ -99,7 +99,7 @@ int run(int count, char** argument) {
   const rig::Rig own = config::read_twin(share / "rigs/ubc_twin.toml");
   const sim_plant::PlantConfig plant = sim_plant::read_plant(share / "plants/ubc_twin.toml");
 
-  std::vector<double> bandwidths{50, 75, 100, 150, 200, 250, 300, 350, 390, 420, 450, 500, 550, 600, 650, 700, 800, 900, 1000};
+  std::vector<double> bandwidths{50, 75, 100, 150, 200, 250, 300, 325, 350, 390, 420, 450, 500, 550, 600, 650, 700, 800, 900, 1000};
   if (options.quick) bandwidths = {200, 350, 390, 450};
   std::vector<Trial> rows;
   std::vector<TraceRow> trace;

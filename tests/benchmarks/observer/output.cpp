@@ -22,9 +22,10 @@ methods = 'nicosia momentum inverse'
 set output folder.'/observer_trade.svg'
 set multiplot layout 2,2 title 'Bandwidth against quantisation: 16,000 counts, friction on, 12 N of range, as modelled'
 set logscale x
-set xtics (50, 100, 200, 390, 700, 1000)
+set xtics (50, 100, 200, 350, 600, 1000)
+set xrange [45:1100]
 set xlabel 'bandwidth [rad/s]'
-set key top left
+set key top right opaque
 do for [hz in '1000 4000'] {
   set title hz.' Hz'
   set ylabel 'RMS of the force error [N]'
@@ -43,14 +44,15 @@ unset logscale
 unset title
 set xtics auto
 set yrange [*:*]
+set xrange [*:*]
 set key outside right top
 set terminal svg size 1000,450 font 'sans,14' background 'white'
 set output folder.'/observer_trace.svg'
-set title 'A step of the hand from -6 to 6 N and a while after it, 1 kHz, 450 rad/s'
+set title 'A step of the hand from -6 to 6 N and a while after it, 1 kHz, 390 rad/s'
 set xlabel 'time [s]'
 set ylabel 'force along x [N]'
 csv = folder.'/observer_trace.csv'
-plot csv skip 1 using 1:2 with steps lw 2 lc 'black' title 'hand', for [k=1:3] csv skip 1 using 1:(column(2+k)) with steps title word(methods, k)
+plot csv skip 1 using 1:2 with steps lw 2 lc 'black' title 'hand', for [k in '2 3 1'] csv skip 1 using 1:(column(2+int(k))) with steps lc int(k) title word(methods, int(k))
 )";
 
 void write_file(const std::filesystem::path& path, const std::string& text) {

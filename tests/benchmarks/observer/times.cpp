@@ -15,7 +15,7 @@ void print_times(const Course& course, const rig::Rig& rig, int turns) {
   std::vector<Row> rows;
   double sink = 0.0;
   for (const std::string& method : methods) {
-    rows.push_back({method, [&, estimate = estimator(method, rig, 450.0), k = std::size_t{0}]() mutable {
+    rows.push_back({method, [&, estimate = estimator(method, rig, 390.0), k = std::size_t{0}]() mutable {
                       const Sample& sample = course.samples[k++ % course.samples.size()];
                       return timed([&] { sink += estimate(sample, course.tick_s)(0); });
                     }});
