@@ -60,10 +60,11 @@ Status nicosia(const ForceObserverConfig& config, ForceObserverState& s, const V
   if (const Status status = dynamics(config.model, 0.5 * (s.angle + angle), velocity, linkages); status != Status::Ok) return status;
   const Vec4 coriolis = each(linkages, [&](const Mat2&, const Mat2& C, Eigen::Index row) -> Vec2 { return C * velocity.segment<2>(row); });
   const Vec4 known = accelerate(linkages, torque - friction(config, velocity) - coriolis);
+  const DisturbanceGains gains = disturbance_gains(config.bandwidth_rad_s, step_s);
   Vec4 unknown;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const DisturbanceEstimate found = update(config.bandwidth_rad_s, s.joint[i], angle(row), known(row), step_s);
+    const DisturbanceEstimate found = update(gains, s.joint[i], angle(row), known(row));
     unknown(row) = found.acceleration;
     s.estimate.joint_velocity(row) = found.velocity;
   }
@@ -198,18 +199,22 @@ double largest_singular_value(const Mat2& m) noexcept {
   return std::sqrt(0.5 * (square + std::sqrt(std::max(0.0, square * square - 4.0 * det * det))));
 }
 
-// Peak over |z| = 1 of T ((1+p)/2)^2 |z-1| / |z-p|^2, at |z-1| = (1-p)/sqrt(p); w T is small enough for it to be there.
-double velocity_gain(double bandwidth_rad_s, double tick_s) noexcept {
-  const double p = std::exp(-bandwidth_rad_s * tick_s);
-  return tick_s * (1.0 + p) * (1.0 + p) / (8.0 * std::sqrt(p) * (1.0 - p));
+// The peak is where |z-1|^2 = b/sqrt(a0), which is on the circle as long as the tick is admissible.
+bool fast_enough(const DisturbanceGains& g) noexcept { return g.b <= 4.0 * std::sqrt(g.a0); }
+double velocity_gain(const DisturbanceGains& g) noexcept {
+  return 0.25 * g.step_s * (1.0 + g.a1 + g.a0) / std::sqrt(g.a1 * (1.0 + g.a0) - 4.0 * g.a0 + 2.0 * g.b * std::sqrt(g.a0));
 }
 
-// RMS of the acceleration found over that of white errors of position, 1/s^2: the norms of
-//   Nicosia ((1-p)/T)^2 (z-1)^2/(z-p)^2,   Momentum (1-p)/T^2 (z-1)^2/(z (z-p)),   summed in closed form.
+// RMS of the acceleration found over that of white errors of position, 1/s^2: the norms, summed in closed form, of
+//   Nicosia b/T^2 (z-1)^2/(z^2 - a1 z + a0),   Momentum (1-p)/T^2 (z-1)^2/(z (z-p)) with p = exp(-w T).
 double noise_gain(ObserverKind kind, double bandwidth_rad_s, double tick_s) noexcept {
-  const double p = std::exp(-bandwidth_rad_s * tick_s), r = -std::expm1(-bandwidth_rad_s * tick_s), b = 1.0 + p;
-  if (kind == ObserverKind::Nicosia) return r * r / (tick_s * tick_s) * std::sqrt(1.0 + r * (1.0 + (2.0 + p) * (2.0 + p)) / (b * b * b));
-  return r / (tick_s * tick_s) * std::sqrt(1.0 + (2.0 - p) * (2.0 - p) + r * r * r / b);
+  if (kind == ObserverKind::Nicosia) {
+    const DisturbanceGains g = disturbance_gains(bandwidth_rad_s, tick_s);
+    const double above = 6.0 * (1.0 + g.a0) - 8.0 * g.a1 + 2.0 * (g.a1 * g.a1 - g.a0 * (1.0 + g.a0));
+    return g.b / (tick_s * tick_s) * std::sqrt(above / ((1.0 - g.a0) * g.b * (1.0 + g.a0 + g.a1)));
+  }
+  const double p = std::exp(-bandwidth_rad_s * tick_s), r = -std::expm1(-bandwidth_rad_s * tick_s);
+  return r / (tick_s * tick_s) * std::sqrt(1.0 + (2.0 - p) * (2.0 - p) + r * r * r / (1.0 + p));
 }
 
 struct Worst {
@@ -256,7 +261,8 @@ Admission admit(const ForceObserverConfig& config, const rig::Rig& rig, double c
   bool good = positive(w) && positive(tick_s) && rig.actuation.encoder_counts_per_turn > 0;
   for (const JointFriction& f : config.friction) good = good && (f.coulomb_nm == 0.0 || positive(f.smoothing_rad_s));
   if (!good) return {.verdict = Admissible::NotPositive};
-  if (w * tick_s > std::log(3.0 + 2.0 * std::numbers::sqrt2)) return {.verdict = Admissible::TooFastForTick};
+  const DisturbanceGains gains = disturbance_gains(w, tick_s);
+  if (!fast_enough(gains)) return {.verdict = Admissible::TooFastForTick};
 
   Worst worst;
   const auto& x = rig.limits.workspace_x_m;
@@ -271,7 +277,7 @@ Admission admit(const ForceObserverConfig& config, const rig::Rig& rig, double c
   const double count_rad = 2.0 * std::numbers::pi / rig.actuation.encoder_counts_per_turn;
   out.count_force_n = worst.force * noise_gain(config.kind, w, tick_s) * count_rad / std::sqrt(12.0);
   if (config.kind == ObserverKind::Nicosia) {
-    const double gain = velocity_gain(w, tick_s);
+    const double gain = velocity_gain(gains);
     out.speed_gain = 3.0 * gain * worst.coriolis;
     out.friction_gain = gain * worst.friction;
   }

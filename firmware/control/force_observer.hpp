@@ -1,20 +1,21 @@
 // Wrench of the hand on the handle, and joint velocities, from encoders and motor torques (thesis A.2): one observer for each linkage.
 //   D(theta) theta'' + C(theta, theta') theta' = tau - tau_f(theta') + r,   r = J^T f, f the force of the rest on the end point
 // The rigid handle (mass m, centre of mass a of the coupling's length from P0, inertia I) is for both linkages the same as masses
-// (1-a) m at P0 and a m at P1, and a spare inertia S = I - m a (1-a) coupling^2 about nothing in particular. With those masses in D,
+// (1-a) m at P0 and a m at P1, and a pure inertia, the spare S = I - m a (1-a) coupling^2. With those masses in D,
 //   wrench = H^T (r_0, r_1) + (0, 0, S theta'')     H = J_e^-1 J_o of twin.hpp; it exists at parallel singularities too
 // Forces along the coupling are in r and not in H^T r. Signs: the wrench is what the hand applies to the mechanism (f_x, f_y in N, moment
 // about the handle in N m); a push to +x reads +f_x. The thesis prints the feedback with the other sign, with which it diverges.
 //
 // Nicosia (S. Nicosia, P. Tomei, IEEE Trans. Automatic Control 35(9), 1990, 1058; thesis A.4 to A.6), e = theta - theta_hat:
-//   theta_hat' = v + k_v e,  v' = D^-1 (-C theta'_hat - tau_f + tau + k_p e),   k_v = 2 w,  k_p = w^2 D(theta)
+//   theta_hat' = v + k_v e,  v' = D^-1 (-C theta'_hat - tau_f + tau + k_p e),   k_v = sqrt(2) w,  k_p = w^2 D(theta)
 //   D e'' + (C(theta, theta') + C(theta, theta'_hat) + k_v D) e' + k_p e = J^T f;   at rest J^T f = k_p e
-//   k_p grows with D, so both poles of every joint lie at -w in every pose. A tick integrates exactly, D frozen at its middle and the
-//   remaining torques held (disturbance.hpp).
-//   Stability, by the small-gain theorem (G. Zames, same Transactions 11, 1966): unmodelled in the frozen error is an acceleration
-//   D^-1 (C(theta, theta') + C(theta, theta'_hat) + slope of tau_f) times the velocity error, and of the exact sampled dynamics
-//     |velocity error / acceleration| = |T ((1+p)/2)^2 (z-1)/(z-p)^2| <= gain = T (1+p)^2 / (8 sqrt(p) (1-p))   (T -> 0: 1/(2 w))
-//   on |z| = 1. Errors vanish if gain * (3 |D^-1 C| + |D^-1 tau_f'|) < 1 over poses and speeds (3: while the velocity error is at most the
+//   k_p grows with D, so every joint has the same poles in every pose and w is the -3 dB bandwidth of the force. A tick integrates exactly,
+//   D frozen at its middle and the remaining torques held (disturbance.hpp: a0, a1, b). Stability, by the small-gain theorem (G. Zames,
+//   same Transactions 11, 1966): unmodelled in the frozen error is an acceleration D^-1 (C(theta, theta') + C(theta, theta'_hat) + slope of
+//   tau_f) times the velocity error, and of the exact sampled dynamics
+//     velocity error / acceleration = T (1+a1+a0)/4 (z-1)/(z^2 - a1 z + a0), on |z| = 1 at most
+//     gain = T (1+a1+a0)/4 / sqrt(a1 (1+a0) - 4 a0 + 2 b sqrt(a0))      (T -> 0: 1/(sqrt(2) w))
+//   Errors vanish if gain * (3 |D^-1 C| + |D^-1 tau_f'|) < 1 over poses and speeds (3: while the velocity error is at most the
 //   greatest speed itself). It bounds w from below; Nicosia and Tomei's bound on k_d has the same form.
 // Momentum (A. De Luca, R. Mattone, IEEE ICRA 2005, 999), momentum D theta' from plain differences:
 //   d/dt (D theta') = tau - tau_f + C^T theta' + r,   r_hat' = w (r - r_hat): exact for torques held over a tick
@@ -78,10 +79,10 @@ mechanism::Status update(const ForceObserverConfig& config, ForceObserverState& 
 
 enum class Admissible : std::uint8_t {
   Yes,
-  NotPositive,       // bandwidth, tick or counts: zero, negative or NaN; or a friction without a smoothing speed
-  NotAPose,          // a corner of the workspace cannot be taken, or a linkage has no positive inertia
-  TooFastForTick,    // w T > ln(3 + 2 sqrt 2): from there on the gain is greatest at the Nyquist frequency, nothing is filtered any more
-  TooSlowForSpeed,   // Nicosia: the gain above with C alone is 1 or more
+  NotPositive,      // bandwidth, tick or counts: zero, negative or NaN; or a friction without a smoothing speed
+  NotAPose,         // a corner of the workspace cannot be taken, or a linkage has no positive inertia
+  TooFastForTick,   // b > 4 sqrt(a0), w T > 1.99: from there on the gain is greatest at the Nyquist frequency, nothing is filtered any more
+  TooSlowForSpeed,  // Nicosia: the gain above with C alone is 1 or more
   FrictionTooSteep,  // Nicosia: with friction it is; smooth it more
   EncoderTooCoarse,  // counts alone make a force error above the RMS allowed
 };
