@@ -1,5 +1,7 @@
 #include "firmware/control/display.hpp"
 
+#include <algorithm>
+
 namespace trocar::control {
 
 using mechanism::Vec3;
@@ -19,12 +21,12 @@ Vec3 admittance(const AdmittanceConfig& config, SlaveState& slave, const Display
 }  // namespace
 
 Vec3 slave_pose(const DisplayConfig& config, const DisplayState& state, const Vec3& pose) noexcept {
-  if (state.display != Display::Impedance) return state.slave.pose;
-  FadeState glide = state.glide;
-  return update(config.glide, glide, pose, 0.0);
+  const Vec3& slave = state.display == Display::Impedance ? pose : state.slave.pose;
+  return slave + weight(config.glide, state.glide) * state.glide.offset;
 }
 
 Vec3 update(const DisplayConfig& config, DisplayState& state, const DisplayInput& in) noexcept {
+  state.glide.time_s = std::min(state.glide.time_s + in.dt_s, config.glide.duration_s);
   switch (state.display) {
     case Display::Admittance:
       return admittance(config.admittance, state.slave, in);
@@ -33,8 +35,6 @@ Vec3 update(const DisplayConfig& config, DisplayState& state, const DisplayInput
     case Display::Impedance:
       break;
   }
-  // Where another display would take over with the next tick.
-  state.slave = {update(config.glide, state.glide, in.pose, in.dt_s) + in.dt_s * in.velocity, in.velocity};
   return -in.environment_force;
 }
 

@@ -22,11 +22,17 @@ struct FadeState {
 // `last`: what the output was; `law`: what the new law gives this tick.
 inline void begin(FadeState& state, const mechanism::Vec3& last, const mechanism::Vec3& law) noexcept { state = {last - law, 0.0}; }
 
+// Weight of the offset in the next update: 1 at the start, 0 from the end on.
+[[nodiscard]] inline double weight(const FadeConfig& config, const FadeState& state) noexcept {
+  if (!(state.time_s < config.duration_s)) return 0.0;
+  const double p = state.time_s / config.duration_s;
+  return 1.0 - p * p * (3.0 - 2.0 * p);
+}
+
 [[nodiscard]] inline mechanism::Vec3 update(const FadeConfig& config, FadeState& state, const mechanism::Vec3& law, double dt_s) noexcept {
-  const double p = config.duration_s > 0.0 ? std::min(1.0, state.time_s / config.duration_s) : 1.0;
-  if (p >= 1.0) return law;
-  state.time_s += dt_s;
-  return law + (1.0 - p * p * (3.0 - 2.0 * p)) * state.offset;
+  const mechanism::Vec3 out = law + weight(config, state) * state.offset;
+  state.time_s = std::min(state.time_s + dt_s, config.duration_s);
+  return out;
 }
 
 }  // namespace trocar::control

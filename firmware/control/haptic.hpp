@@ -24,15 +24,16 @@ struct HapticState {
   FadeState fade{};
   PassivityState guard{};
   LimitState limits{};
-  bool begins{};                                  // the next update is the first of a display
-  mechanism::Vec3 f_m = mechanism::Vec3::Zero();  // sent, as the display's port has it
+  bool begins{};                                         // the next update is the first of a display
+  mechanism::Vec3 slave_push = mechanism::Vec3::Zero();  // fades with the offset
+  mechanism::Vec3 f_m = mechanism::Vec3::Zero();         // sent, as the display's port has it
 };
 
 // From another mode whose last wrench was u: the first output is u again (within the limits). The guard starts at zero energy.
 void enter(HapticState& state, Display display, const DeviceState& device, const mechanism::Vec3& u) noexcept;
 
 // To another display while one runs.
-void change(HapticState& state, Display display, const DeviceState& device) noexcept;
+void change(const HapticConfig& config, HapticState& state, Display display, const DeviceState& device) noexcept;
 
 // Where to evaluate f_e for this tick.
 [[nodiscard]] inline mechanism::Vec3 slave_pose(const HapticConfig& config, const HapticState& state, const DeviceState& device) noexcept {
