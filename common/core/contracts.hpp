@@ -41,8 +41,9 @@ enum class Fault : std::uint8_t {
   Singular,        // too close to a singularity
   NotFinite,       // a number is NaN or infinite
   SolverNotConverged,
+  NotPassive,  // a haptic display gave more energy than it took
 };
-inline constexpr std::size_t fault_count = 16;
+inline constexpr std::size_t fault_count = 17;
 
 enum class CommandKind : std::uint8_t {
   KeepAlive,    // the commander is alive; resets the host timeout
@@ -160,10 +161,10 @@ struct Sample {
   return static_cast<std::size_t>(m) < names.size() ? names[static_cast<std::size_t>(m)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(Fault f) noexcept {
-  constexpr std::array<const char*, fault_count> names{"None",           "FeedbackLost",    "HeartbeatLost", "DriveFault",
-                                                       "SensorLost",     "SensorSaturated", "LateTick",      "EncoderJump",
-                                                       "Inconsistent",   "TrackingError",   "ForceLimit",    "VelocityLimit",
-                                                       "WorkspaceLimit", "Singular",        "NotFinite",     "SolverNotConverged"};
+  constexpr std::array<const char*, fault_count> names{
+      "None",           "FeedbackLost", "HeartbeatLost", "DriveFault",         "SensorLost", "SensorSaturated",
+      "LateTick",       "EncoderJump",  "Inconsistent",  "TrackingError",      "ForceLimit", "VelocityLimit",
+      "WorkspaceLimit", "Singular",     "NotFinite",     "SolverNotConverged", "NotPassive"};
   return static_cast<std::size_t>(f) < names.size() ? names[static_cast<std::size_t>(f)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(CommandKind k) noexcept {

@@ -29,14 +29,25 @@ constexpr double velocity_bandwidth_rad_s = 300.0;  // one count of 40 um distur
 constexpr double load_bandwidth_rad_s = 60.0;
 constexpr double longest_step_s = 0.005;           // after a stall the reference goes on slowly instead of jumping
 constexpr double jump_factor = 4.0;                // motion per tick beyond this many times the velocity fault is no motion
+constexpr double hand_bandwidth_rad_s = 390.0;     // of the force observer: tests/benchmarks/observer
+constexpr std::uint32_t most_unsolved_ticks = 20;  // of the virtual needle in a row, then its wrench is too old to be felt
 constexpr double friction_smoothing_rad_s = 0.01;  // joint speed at which the fed-forward Coulomb friction is at 76 %
+
+control::HapticConfig haptic_config(const rig::Rig& rig) noexcept {
+  control::HapticConfig config;
+  config.limits = control::output_limits(rig.limits);
+  return config;
+}
 
 }  // namespace
 
-Controller::Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time) noexcept
+Controller::Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time, virtual_needle::VirtualNeedle* needle) noexcept
     : rig_(rig),
       mail_(mail),
       late_limit_ns_(1000 * static_cast<std::int64_t>(real_time ? rig.timing.late_tick_us : rig.timing.late_tick_best_effort_us)),
+      needle_(needle),
+      hand_config_(control::force_observer_config(rig, control::ObserverKind::Nicosia, hand_bandwidth_rad_s)),
+      haptic_config_(haptic_config(rig)),
       host_(static_cast<std::int64_t>(rig.timing.host_timeout_ms) * ns_per_ms),
       enabling_(enable_timeout_ns) {}
 
@@ -107,6 +118,14 @@ void Controller::observe() noexcept {
       velocity_[i] = control::update(config, velocity_observer_[static_cast<std::size_t>(i)], state_.x[i], dt_s_);
   }
   observe_force();
+  if (needle_ != nullptr) observe_hand();
+}
+
+// What acted between the last two sets of encoder values is what was sent before the first of them; over a gap, drives go on with the last.
+void Controller::observe_hand() noexcept {
+  since_hand_s_ += dt_s_;
+  if (!link_.complete || !pose_valid_) return;
+  if (control::update(hand_config_, hand_, joint_rad_, acted_nm_, since_hand_s_) == mechanism::Status::Ok) since_hand_s_ = 0.0;
 }
 
 // The sensor sits at the needle base and turns with it; it measures what the base applies to the needle.
@@ -188,6 +207,9 @@ void Controller::execute(const Command& command) noexcept {
     case CommandKind::Move:
       code = move(command);
       break;
+    case CommandKind::Haptic:
+      code = begin_haptic(command);
+      break;
     case CommandKind::SelectGains:
       if (session_ != 0 && !mine) {
         code = ReplyCode::SessionTaken;
@@ -227,6 +249,7 @@ ReplyCode Controller::home() noexcept {
   }
   state_.x = pose;
   velocity_observer_ = {};
+  hand_ = {};
   homed_ = true;
   pose_valid_ = false;
   tared_ = false;
@@ -283,6 +306,24 @@ ReplyCode Controller::move(const Command& command) noexcept {
   last_move_id_ = command.id;
   raise(Trigger::MoveAccepted);
   return ReplyCode::Accepted;
+}
+
+ReplyCode Controller::begin_haptic(const Command& command) noexcept {
+  if (command.session == 0 || session_ == 0) return ReplyCode::NoSession;
+  if (command.session != session_) return ReplyCode::SessionTaken;
+  if (!safety::has_torque(mode_) || stopping_) return ReplyCode::WrongMode;
+  if (motion_.moving() || tare_ticks_ != 0 || !pose_valid_) return ReplyCode::NotAtRest;
+  if (needle_ == nullptr || !needle_->ready()) return ReplyCode::NoModel;
+  control::DeviceState now;
+  if (!device(now)) return ReplyCode::UnreachablePose;
+  if (mode_ == Mode::Haptic) {
+    control::change(haptic_config_, haptic_, command.display, now);
+  } else {
+    control::enter(haptic_, command.display, now, wrench_);
+    needle_->start();
+  }
+  raise(Trigger::HapticAccepted);
+  return ReplyCode::Done;
 }
 
 bool Controller::path_is_reachable(const Vec3& from, const Vec3& to) noexcept {
@@ -414,6 +455,10 @@ void Controller::supervise(const TickInput& input) noexcept {
   const double force = base_wrench_.head<2>().norm();
   check(force > l.fault_force_n, Fault::ForceLimit, force, l.fault_force_n);
   check(std::abs(base_wrench_[2]) > l.fault_moment_nm, Fault::ForceLimit, base_wrench_[2], l.fault_moment_nm);
+  if (mode_ == Mode::Haptic) {
+    check(needle_->unsolved_ticks() > most_unsolved_ticks, Fault::SolverNotConverged, needle_->unsolved_ticks(), most_unsolved_ticks);
+    check(haptic_.guard.energy_j < -haptic_config_.guard.bound_j, Fault::NotPassive, haptic_.guard.energy_j, -haptic_config_.guard.bound_j);
+  }
   if (position_controlled()) {
     const Vec3 e = motion_.reference().pose - state_.x;
     check(e.head<2>().norm() > l.tracking_m, Fault::TrackingError, e.head<2>().norm(), l.tracking_m);
@@ -432,16 +477,24 @@ bool Controller::position_controlled() const noexcept {
 }
 
 void Controller::control() noexcept {
-  wrench_.setZero();
   command_ = {};
   command_.reset_faults = reset_drives_;
   reset_drives_ = false;
-  if (!position_controlled() || !pose_valid_) {
+  if (!pose_valid_ || (!position_controlled() && mode_ != Mode::Haptic)) {
+    wrench_.setZero();
     if (mode_ == Mode::Armed || arm_command_.session != 0) command_.request = hal::DriveRequest::Enable;
     gate_.last_nm = {};
     return;
   }
   command_.request = hal::DriveRequest::Enable;
+  if (mode_ == Mode::Haptic)
+    control_haptic();
+  else
+    control_position();
+}
+
+void Controller::control_position() noexcept {
+  wrench_.setZero();
   const control::Reference& reference = motion_.update(dt_s_);
   const rig::GainSet& gains = rig_.gain_set[gain_set_];
   const Vec3 error = reference.pose - state_.x;
@@ -467,13 +520,40 @@ void Controller::control() noexcept {
     const double limit = i < 2 ? rig_.limits.command_force_n : rig_.limits.command_moment_nm;
     if (std::isfinite(wrench_[i])) wrench_[i] = std::clamp(wrench_[i], -limit, limit);
   }
+  send(friction);
+}
+
+bool Controller::device(control::DeviceState& device) const noexcept {
+  device.pose = state_.x;
+  device.velocity = hand_.estimate.handle_velocity;
+  device.hand_force = hand_.estimate.wrench;
+  return mechanism::dynamics(rig_.twin, state_, device.velocity, device.M, device.C) == mechanism::Status::Ok;
+}
+
+// Where the mechanism's equations fail, the last wrench stands: the supervisor sees the singularity.
+void Controller::control_haptic() noexcept {
+  control::DeviceState now;
+  if (device(now)) {
+    virtual_pose_ = control::slave_pose(haptic_config_, haptic_, now);
+    virtual_wrench_ = needle_->step(virtual_pose_, dt_s_);
+    wrench_ = control::update(haptic_config_, haptic_, now, virtual_wrench_, dt_s_);
+  }
+  Vec4 friction;
+  for (Eigen::Index i = 0; i < 4; ++i)
+    friction[i] = control::friction_torque_nm(hand_config_.friction[static_cast<std::size_t>(i)], hand_.estimate.joint_velocity[i]);
+  send(friction);
+}
+
+void Controller::send(const Vec4& friction_nm) noexcept {
   Vec4 gear;
   for (std::size_t i = 0; i < 4; ++i) gear[static_cast<Eigen::Index>(i)] = rig_.actuation.gear_ratio[i];
-  const Vec4 torque = gear.cwiseProduct(mechanism::actuator_torque(joint_map_, gear, wrench_)) + friction;
+  const Vec4 torque = gear.cwiseProduct(mechanism::actuator_torque(joint_map_, gear, wrench_)) + friction_nm;
   for (std::size_t i = 0; i < 4; ++i) command_.joint_torque_nm[i] = torque[static_cast<Eigen::Index>(i)];
 }
 
 void Controller::limit_and_send() noexcept {
+  acted_nm_ = sent_nm_;
+  sent_nm_.setZero();
   if (command_.request != hal::DriveRequest::Enable) return;
   safety::JointTorques allowed{};
   if (!safety::pass(rig_, gate_, command_.joint_torque_nm, dt_s_, allowed)) {
@@ -481,6 +561,20 @@ void Controller::limit_and_send() noexcept {
     command_.request = hal::DriveRequest::Disable;
   }
   command_.joint_torque_nm = allowed;
+  for (std::size_t i = 0; i < 4; ++i) sent_nm_[static_cast<Eigen::Index>(i)] = allowed[i];
+}
+
+// Position control takes over where the handle is. Its integral begins with what the last law pushed, so that the wrench does not step.
+void Controller::stand_here() noexcept {
+  motion_.rest(state_.x);
+  pid_ = {};
+  if (mode_ != Mode::Haptic) return;
+  const rig::GainSet& gains = rig_.gain_set[gain_set_];
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const rig::AxisGains& g = i < 2 ? gains.translation : gains.rotation;
+    const double fed_forward = gains.feed_forward && tared_ ? load_[i] : 0.0;
+    pid_[static_cast<std::size_t>(i)].integral = wrench_[i] - fed_forward + g.derivative * velocity_[i];
+  }
 }
 
 void Controller::record(const TickInput& input) noexcept {
@@ -505,6 +599,16 @@ void Controller::record(const TickInput& input) noexcept {
     s.wrench_command[i] = wrench_[k];
     s.base_wrench[i] = homed_ ? base_wrench_[k] : nan;
   }
+  const bool haptic = mode_ == Mode::Haptic;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    s.handle_wrench[i] = haptic ? hand_.estimate.wrench[k] : nan;
+    s.virtual_pose[i] = haptic ? virtual_pose_[k] : nan;
+    s.virtual_wrench[i] = haptic ? virtual_wrench_[k] : nan;
+  }
+  s.display_energy_j = haptic ? haptic_.guard.energy_j : nan;
+  s.virtual_contacts = haptic ? needle_->result().contacts : 0;
+  s.virtual_status = haptic ? static_cast<std::uint8_t>(needle_->result().status) : std::uint8_t{0};
   s.residual_m = homed_ ? state_.residual_m : nan;
   s.singularity = homed_ ? singularity_ : nan;
   s.missed_feedback = missed_feedback_;
@@ -528,6 +632,7 @@ void Controller::latch(Fault fault, double value, double limit) noexcept {
   fault_ = fault;
   const Mode from = mode_;
   const bool controlled = position_controlled();
+  if (from == Mode::Haptic) stand_here();
   raise(Trigger::FaultRaised);
   announce(EventKind::FaultLatched, from, mode_, value, limit);
   abandon_arm();
@@ -538,9 +643,8 @@ void Controller::latch(Fault fault, double value, double limit) noexcept {
     motion_.rest(state_.x);
   } else if (controlled || from == Mode::Position || from == Mode::Hold) {
     motion_.brake(rig_.limits);
-  } else {
-    motion_.rest(state_.x);
-    pid_ = {};
+  } else if (from != Mode::Haptic) {
+    stand_here();
   }
   held_ = reaction != safety::Reaction::TorqueOff;
   stopping_ = held_ && (stopping_ || reaction == safety::Reaction::QuickStop);  // a stop that was asked for stays asked for
@@ -573,10 +677,7 @@ void Controller::abandon_tare() noexcept {
 }
 
 void Controller::hold_here() noexcept {
-  if (mode_ == Mode::Armed) {
-    motion_.rest(state_.x);
-    pid_ = {};
-  }
+  if (mode_ == Mode::Armed || mode_ == Mode::Haptic) stand_here();
   motion_end_ = ReplyCode::Stopped;
   motion_.brake(rig_.limits);
   raise(Trigger::HoldAsked);

@@ -10,6 +10,8 @@
 #include "common/core/ring.hpp"
 #include "common/mechanism/twin.hpp"
 #include "common/rig/rig.hpp"
+#include "firmware/control/force_observer.hpp"
+#include "firmware/control/haptic.hpp"
 #include "firmware/control/motion.hpp"
 #include "firmware/control/pid.hpp"
 #include "firmware/control/velocity_observer.hpp"
@@ -17,6 +19,7 @@
 #include "firmware/safety/modes.hpp"
 #include "firmware/safety/output_gate.hpp"
 #include "firmware/safety/watchdog.hpp"
+#include "firmware/virtual_needle/virtual_needle.hpp"
 #include "hal/rig_link.hpp"
 
 namespace trocar::controller {
@@ -50,8 +53,9 @@ struct Status {
 class Controller {
  public:
   // real_time: the machine granted the whole real-time set-up; selects the lateness limit.
-  // Preconditions: rig is a twin, read and checked by common/config; rig and mail outlive the controller.
-  Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time) noexcept;
+  // needle: what Haptic shows; without one that mode is refused.
+  // Preconditions: rig is a twin, read and checked by common/config; rig, mail and needle outlive the controller.
+  Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time, virtual_needle::VirtualNeedle* needle = nullptr) noexcept;
 
   [[nodiscard]] const hal::LinkCommand& tick(const TickInput& input) noexcept;
 
@@ -63,17 +67,24 @@ class Controller {
   void acquire(const TickInput& input) noexcept;
   void observe() noexcept;
   void observe_force() noexcept;
+  void observe_hand() noexcept;
   void take_commands() noexcept;
   void execute(const Command& command) noexcept;
   [[nodiscard]] ReplyCode home() noexcept;
   [[nodiscard]] ReplyCode arm(const Command& command) noexcept;
   [[nodiscard]] ReplyCode move(const Command& command) noexcept;
+  [[nodiscard]] ReplyCode begin_haptic(const Command& command) noexcept;
   [[nodiscard]] ReplyCode reset_fault() noexcept;
   [[nodiscard]] bool path_is_reachable(const mechanism::Vec3& from, const mechanism::Vec3& to) noexcept;
   void follow_up() noexcept;
   void supervise(const TickInput& input) noexcept;
   void check(bool violated, Fault fault, double value, double limit) noexcept;
   void control() noexcept;
+  void control_position() noexcept;
+  void control_haptic() noexcept;
+  [[nodiscard]] bool device(control::DeviceState& device) const noexcept;
+  void send(const mechanism::Vec4& friction_nm) noexcept;
+  void stand_here() noexcept;
   void limit_and_send() noexcept;
   void record(const TickInput& input) noexcept;
 
@@ -122,6 +133,19 @@ class Controller {
   mechanism::Vec3 base_wrench_ = mechanism::Vec3::Zero();    // rig frame, tare removed
   mechanism::Vec3 load_ = mechanism::Vec3::Zero();           // base_wrench_, low-passed
   bool tared_{};
+
+  // the hand, and what it is shown
+  virtual_needle::VirtualNeedle* needle_;
+  control::ForceObserverConfig hand_config_;
+  control::ForceObserverState hand_{};
+  control::HapticConfig haptic_config_;
+  control::HapticState haptic_{};
+  mechanism::Vec3 virtual_pose_ = mechanism::Vec3::Zero();
+  mechanism::Vec3 virtual_wrench_ = mechanism::Vec3::Zero();
+  // Joint torques: of the last tick's command, which act from this tick's SYNC on, and of the one before, which acted up to it.
+  mechanism::Vec4 sent_nm_ = mechanism::Vec4::Zero();
+  mechanism::Vec4 acted_nm_ = mechanism::Vec4::Zero();
+  double since_hand_s_{};  // since the last sample that the observer took
 
   // what runs
   Mode mode_{Mode::Off};

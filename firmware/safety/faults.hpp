@@ -45,6 +45,8 @@ inline constexpr std::array<FaultRow, fault_count> fault_table{{
     {Fault::NotFinite, Reaction::TorqueOff, "a computed value is not a number",
      "keep the flight recording for the maintainers, then reset"},
     {Fault::SolverNotConverged, Reaction::Hold, "the contact solver hit its bound", "keep the recording, lower the speed, then reset"},
+    {Fault::NotPassive, Reaction::Hold, "the haptic display gave more energy than it had taken",
+     "hold the handle firmly, choose a softer scene, then reset"},
 }};
 
 [[nodiscard]] constexpr const FaultRow& row(Fault fault) noexcept { return fault_table[static_cast<std::size_t>(fault)]; }

@@ -7,15 +7,22 @@
 
 #include "common/rig/rig.hpp"
 #include "firmware/controller/controller.hpp"
+#include "firmware/virtual_needle/virtual_needle.hpp"
 #include "hal/can/memory_bus.hpp"
 #include "hal/rig_link.hpp"
+#include "sim_plant/hand/hand.hpp"
 #include "sim_plant/wired/wired_plant.hpp"
 
 namespace trocar::sim_plant {
 
 class Bench {
  public:
-  Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed);
+  // scene: the tissue in front of the machine. needle: what the controller shows in Haptic; must outlive the bench, as the hand must.
+  Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed,
+        virtual_needle::VirtualNeedle* needle = nullptr);
+
+  // From now on this hand holds the handle; nullptr: nobody.
+  void give_to(Hand* hand) noexcept { hand_ = hand; }
 
   // One controller period. Afterwards sample() is the tick's, and mail() has what the controller said.
   void tick() noexcept;
@@ -36,6 +43,7 @@ class Bench {
   hal::RigLink<hal::MemoryPort> link_;
   controller::Controller controller_;
   WiredPlant plant_;
+  Hand* hand_{nullptr};
   std::int64_t now_ns_{};
 };
 

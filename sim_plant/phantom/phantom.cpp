@@ -23,8 +23,7 @@ Phantom::Vector3 Phantom::advance(const Vector3& base_pose, double dt_s) noexcep
   ++counters_.steps;
   counters_.refused += result.status == Status::NotFinite ? 1u : 0u;
   counters_.incomplete += result.status == Status::CapacityReached || result.status == Status::LeftCandidates ? 1u : 0u;
-  counters_.unconverged +=
-      result.status == Status::TipLost || result.status == Status::IllConditioned || result.status == Status::PivotLimit ? 1u : 0u;
+  counters_.unconverged += result.status >= Status::TipLost && result.status <= Status::NotConverged ? 1u : 0u;
   counters_.pivots += static_cast<std::uint64_t>(result.pivots);
   counters_.rows_factored += static_cast<std::uint64_t>(result.rows_factored);
   residual_n_ = result.residual_n;

@@ -34,7 +34,7 @@ class Phantom {
 
   struct Counters {  // since construction
     std::uint64_t steps{};
-    std::uint64_t unconverged{};  // residual above its tolerance, tip searches out of iterations
+    std::uint64_t unconverged{};  // residual above its tolerance, tip searches out of iterations, a needle that bends without equilibrium
     std::uint64_t refused{};      // input not finite
     std::uint64_t incomplete{};   // steps in which a contact was missing: capacity, or the end of the candidates
     std::uint64_t pivots{};

@@ -39,6 +39,8 @@ class WiredPlant {
   bool drive_transmits(std::size_t drive, hal::CanFrame& frame) noexcept { return drive_[drive].transmit(frame); }
   bool sensor_transmits(hal::CanFrame& frame) noexcept { return sensor_.transmit(frame); }
 
+  void set_hand_wrench(const std::array<double, 3>& wrench) noexcept { physics_.set_hand_wrench(wrench); }
+
   [[nodiscard]] const Plant& physics() const noexcept { return physics_; }
   [[nodiscard]] const DriveNode& drive(std::size_t i) const noexcept { return drive_[i]; }
 

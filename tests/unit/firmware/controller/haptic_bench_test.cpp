@@ -1,0 +1,157 @@
+// A person at the handle, in lock-step: the real controller with a virtual needle, the real bus, the simulated machine, an arm that wants
+// to push the needle in and draw it out again.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "common/condense/compile.hpp"
+#include "common/config/rig_file.hpp"
+#include "common/scene/scene.hpp"
+#include "sim_plant/bench/bench.hpp"
+#include "sim_plant/plant/plant_file.hpp"
+
+namespace trocar::sim_plant {
+namespace {
+
+using Pose = std::array<double, 3>;
+
+struct Felt {
+  double worst_step_n{};  // of the command in a tick
+  double hand_error{};    // RMS of the estimated force against the hand's own, N
+  double most_n{};        // the virtual needle's resistance
+  double least_energy_j{};
+  std::uint32_t most_contacts{};
+  int unsolved{};
+  long ticks{};
+};
+
+class Haptics {
+ public:
+  Haptics() : hand_({}, pose_of(rig_)) {
+    // Nothing stands in front of the machine itself.
+    scene::Scene air = scene_;
+    for (double& y : air.tissue.grid->axis_m[1]) y += 1.0;
+    condense::Options options;
+    options.visible = condense::WithVisible::No;
+    bytes_ = condense::compile_to_memory(scene_, options).image;
+    if (model::open(bytes_.span(), image_) != model::ImageStatus::Ok) throw std::runtime_error("the image cannot be opened");
+    needle_.offer(&image_);
+    bench_ = std::make_unique<Bench>(rig_, read_plant(share_ / "plants/ubc_twin_haptic.toml"), air, 1, &needle_);
+  }
+
+  void tick(int n) {
+    for (int i = 0; i < n; ++i) {
+      bench_->mail().commands.push({.session = 1, .kind = CommandKind::KeepAlive});
+      bench_->tick();
+      Reply r;
+      while (bench_->mail().replies.pop(r)) last_ = r.code;
+      look();
+    }
+  }
+  ReplyCode send(Command c, int ticks) {
+    c.session = 1;
+    c.id = ++id_;
+    bench_->mail().commands.push(c);
+    tick(ticks);
+    return last_;
+  }
+  void arm() {
+    tick(1500);
+    send({.kind = CommandKind::Home}, 100);
+    send({.kind = CommandKind::Tare}, 300);
+    send({.kind = CommandKind::Arm}, 300);
+  }
+  // Takes the handle where it is.
+  void take() {
+    hand_.hold(bench_->plant().physics().pose());
+    bench_->give_to(&hand_);
+  }
+  void want(const std::vector<std::pair<double, Pose>>& way) {
+    std::vector<Intention> points{{now_s(), bench_->plant().physics().pose()}};
+    for (const auto& [seconds, pose] : way) points.push_back({points.back().time_s + seconds, pose});
+    hand_.want(points);
+  }
+  [[nodiscard]] double now_s() { return 1e-9 * static_cast<double>(bench_->now_ns()); }
+  [[nodiscard]] const Sample& sample() { return bench_->sample(); }
+  [[nodiscard]] const Felt& felt() const { return felt_; }
+  [[nodiscard]] Hand& hand() { return hand_; }
+  [[nodiscard]] virtual_needle::VirtualNeedle& needle() { return needle_; }
+  [[nodiscard]] const model::Image& image() const { return image_; }
+  void forget() { felt_ = {}; }
+  [[nodiscard]] static Pose pose_of(const rig::Rig& rig) { return {rig.homing_pose[0], rig.homing_pose[1], rig.homing_pose[2]}; }
+
+ private:
+  void look() {
+    const Sample& s = sample();
+    if (s.mode == Mode::Haptic) {
+      const double dx = s.wrench_command[0] - before_[0], dy = s.wrench_command[1] - before_[1];
+      if (was_haptic_) felt_.worst_step_n = std::max(felt_.worst_step_n, std::hypot(dx, dy));
+      const double ex = s.handle_wrench[0] - hand_.wrench()[0], ey = s.handle_wrench[1] - hand_.wrench()[1];
+      felt_.hand_error = std::sqrt((felt_.hand_error * felt_.hand_error * static_cast<double>(felt_.ticks) + ex * ex + ey * ey) /
+                                   static_cast<double>(felt_.ticks + 1));
+      ++felt_.ticks;
+      felt_.most_n = std::max(felt_.most_n, std::hypot(s.virtual_wrench[0], s.virtual_wrench[1]));
+      felt_.least_energy_j = std::min(felt_.least_energy_j, s.display_energy_j);
+      felt_.most_contacts = std::max(felt_.most_contacts, s.virtual_contacts);
+      felt_.unsolved += s.virtual_status > 4 ? 1 : 0;
+    }
+    was_haptic_ = s.mode == Mode::Haptic;
+    before_ = s.wrench_command;
+  }
+
+  std::filesystem::path share_{TROCAR_SHARE};
+  rig::Rig rig_ = config::read_rig(share_ / "rigs/ubc_twin_haptic.toml");
+  scene::Scene scene_ = scene::read_scene(share_ / "scenes/phantom.toml");
+  image_file::AlignedBytes bytes_;
+  model::Image image_{};
+  virtual_needle::VirtualNeedle needle_;
+  Hand hand_;
+  std::unique_ptr<Bench> bench_;
+  ReplyCode last_{};
+  std::uint32_t id_{};
+  std::array<double, 3> before_{};
+  bool was_haptic_{};
+  Felt felt_;
+};
+
+TEST(HapticLoop, APersonPushesTheVirtualNeedleInAndDrawsItOut) {
+  for (const Display display : {Display::FourChannel, Display::Impedance, Display::Admittance}) {
+    SCOPED_TRACE(static_cast<int>(display));
+    Haptics h;
+    h.arm();
+    ASSERT_EQ(h.sample().mode, Mode::Armed);
+    h.take();
+    h.tick(300);
+    ASSERT_EQ(h.send({.kind = CommandKind::Haptic, .display = display}, 1000), ReplyCode::Done);
+    ASSERT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
+    Pose deep = h.sample().pose;
+    deep[1] = 0.185;
+    const Pose out = h.sample().pose;
+    h.want({{5.0, deep}, {1.0, deep}, {5.0, out}});
+    h.tick(5500);
+    EXPECT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
+    EXPECT_GT(h.sample().pose[1], 0.16);
+    // At rest, deep in: what the hand pushes is what the needle resists with.
+    h.tick(500);
+    const double resists = h.sample().virtual_wrench[1];
+    EXPECT_GT(resists, 0.3);
+    EXPECT_NEAR(h.hand().wrench()[1], resists, 0.25);
+    h.tick(6000);
+    EXPECT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
+    EXPECT_EQ(h.sample().virtual_contacts, 0U);
+    const Felt& felt = h.felt();
+    std::printf("display %d: most %.2f N, contacts %u, error %.3f N, energy %.2g J, step %.2f N, unsolved %d, depth %.1f mm\n",
+                static_cast<int>(display), felt.most_n, felt.most_contacts, felt.hand_error, felt.least_energy_j, felt.worst_step_n,
+                felt.unsolved, 1e3 * h.sample().pose[1]);
+    EXPECT_GT(felt.most_contacts, 5U);
+    EXPECT_LT(felt.hand_error, 0.6);
+    EXPECT_GT(felt.least_energy_j, -0.005);
+    EXPECT_EQ(felt.unsolved, 0);
+  }
+}
+
+}  // namespace
+}  // namespace trocar::sim_plant
