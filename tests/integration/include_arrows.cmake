@@ -11,7 +11,7 @@ set(rules
   "^common/image_file$ -> ^common/(fem|scene|condense)/"
   "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/condense|common/image_file|common/experiment)/"
   "^firmware/ -> ^(sim_plant|host)/"
-  "^firmware/(control|safety|controller)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
+  "^firmware/(control|safety|virtual_needle|controller)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
   "^sim_plant/ -> ^host/"
   "^sim_plant/(mechanism|nodes|phantom|plant)$ -> ^firmware/"
   "^host/ -> ^(hal|firmware|sim_plant)/")

@@ -9,11 +9,13 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/image_file/mapped_image.hpp"
 #include "firmware/bridge/bridge.hpp"
 #include "firmware/controller/controller.hpp"
 #include "hal/can/endpoint_bus.hpp"
@@ -36,6 +38,7 @@ struct Options {
   int cpu = -1;
   int priority = 80;
   std::int64_t domain = -1;
+  std::string model;
 };
 
 // Everything of fixed size that the loop uses, in one block that the memory lock covers.
@@ -101,6 +104,13 @@ int run(const Options& options) {
   open(p.drives, p.rig.buses.drives, "drives");
   open(p.sensor, p.rig.buses.sensor, "sensor");
 
+  std::optional<image_file::MappedImage> model;
+  virtual_needle::VirtualNeedle needle;
+  if (!options.model.empty()) {
+    model.emplace(options.model, image_file::Lock::Yes);
+    needle.offer(&model->image());
+  }
+
   bridge::Bridge bridge(p.rig, p.mail, p.shared);
   rt::Setup setup;
   setup.apply({options.priority, options.cpu});
@@ -118,7 +128,7 @@ int run(const Options& options) {
   if (!real_time && !options.best_effort)
     throw config::UserError("the real-time set-up is incomplete (above): mend that, or add --best-effort when no motor is connected");
 
-  controller::Controller controller(p.rig, p.mail, real_time);
+  controller::Controller controller(p.rig, p.mail, real_time, &needle);
   bridge.report_real_time(real_time, missing);
   fmt::print("trocar-rig: {} at {:g} Hz, DDS domain {}, {}\n", p.rig.name.data(), p.rig.timing.tick_hz, p.rig.dds_domain,
              real_time ? "real-time set-up complete" : "best effort");
@@ -135,6 +145,7 @@ int main(int argc, char** argv) {
   bool die_with_parent = false;
   CLI::App app{"trocar-rig: the real-time controller of a rig.\nExample: trocar-rig --rig ubc_twin --best-effort"};
   app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
+  app.add_option("--model", options.model, "model image for Haptic mode, from trocar scene compile");
   app.add_option("--domain", options.domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
   app.add_option("--cpu", options.cpu, "core to run on")->check(CLI::NonNegativeNumber);
   app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();

@@ -30,7 +30,8 @@ struct Felt {
 
 class Haptics {
  public:
-  Haptics() : hand_({}, pose_of(rig_)) {
+  explicit Haptics(int encoder_counts = 16000) : hand_({}, pose_of(rig_)) {
+    rig_.actuation.encoder_counts_per_turn = encoder_counts;
     // Nothing stands in front of the machine itself.
     scene::Scene air = scene_;
     for (double& y : air.tissue.grid->axis_m[1]) y += 1.0;
@@ -143,14 +144,74 @@ TEST(HapticLoop, APersonPushesTheVirtualNeedleInAndDrawsItOut) {
     EXPECT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
     EXPECT_EQ(h.sample().virtual_contacts, 0U);
     const Felt& felt = h.felt();
-    std::printf("display %d: most %.2f N, contacts %u, error %.3f N, energy %.2g J, step %.2f N, unsolved %d, depth %.1f mm\n",
-                static_cast<int>(display), felt.most_n, felt.most_contacts, felt.hand_error, felt.least_energy_j, felt.worst_step_n,
-                felt.unsolved, 1e3 * h.sample().pose[1]);
     EXPECT_GT(felt.most_contacts, 5U);
     EXPECT_LT(felt.hand_error, 0.6);
     EXPECT_GT(felt.least_energy_j, -0.005);
     EXPECT_EQ(felt.unsolved, 0);
   }
+}
+
+TEST(HapticLoop, WantsAModelAndTheSession) {
+  Haptics h;
+  h.needle().offer(nullptr);
+  h.tick(1500);
+  EXPECT_EQ(h.send({.kind = CommandKind::Haptic}, 1), ReplyCode::NoSession);
+  h.send({.kind = CommandKind::Home}, 100);
+  h.send({.kind = CommandKind::Tare}, 300);
+  h.send({.kind = CommandKind::Arm}, 300);
+  EXPECT_EQ(h.send({.kind = CommandKind::Haptic}, 1), ReplyCode::NoModel);
+  EXPECT_EQ(h.sample().mode, Mode::Armed);
+  EXPECT_TRUE(std::isnan(h.sample().handle_wrench[0]));
+  h.needle().offer(&h.image());
+  EXPECT_EQ(h.send({.kind = CommandKind::Haptic}, 1), ReplyCode::Done);
+  EXPECT_EQ(h.sample().mode, Mode::Haptic);
+  EXPECT_EQ(h.send({.kind = CommandKind::Move, .target_pose = h.sample().pose, .speed_m_s = 0.01, .angular_speed_rad_s = 1.0}, 1),
+            ReplyCode::WrongMode);
+  EXPECT_EQ(h.send({.kind = CommandKind::Stop}, 1), ReplyCode::Done);
+  EXPECT_EQ(h.sample().mode, Mode::Ready);
+}
+
+// Deep in the tissue, with encoders so fine that their noise does not count: whatever changes, the wrench does not jump.
+TEST(HapticLoop, NoChangeIsFeltAsAStep) {
+  Haptics h(16'000'000);
+  h.arm();
+  h.take();
+  h.tick(300);
+  const auto step_of = [&](const Command& command, ReplyCode expected) {
+    const std::array<double, 3> before = h.sample().wrench_command;
+    if (h.sample().mode == Mode::Haptic) {
+      EXPECT_GT(std::abs(before[1]), 0.3);
+    }
+    EXPECT_EQ(h.send(command, 1), expected);
+    const std::array<double, 3>& after = h.sample().wrench_command;
+    return std::hypot(after[0] - before[0], after[1] - before[1]);
+  };
+  EXPECT_LT(step_of({.kind = CommandKind::Haptic, .display = Display::FourChannel}, ReplyCode::Done), 0.05);
+  Pose deep = h.sample().pose;
+  deep[1] = 0.18;
+  h.want({{4.0, deep}});
+  h.tick(6000);
+  ASSERT_EQ(h.sample().mode, Mode::Haptic);
+  for (const Display display : {Display::Impedance, Display::Admittance, Display::FourChannel}) {
+    EXPECT_LT(step_of({.kind = CommandKind::Haptic, .display = display}, ReplyCode::Done), 0.05) << static_cast<int>(display);
+    h.tick(1000);
+    ASSERT_EQ(h.sample().mode, Mode::Haptic);
+  }
+  // Another model of the same place: contacts and forces begin anew there.
+  const model::Image other = h.image();
+  h.forget();
+  h.needle().offer(&other);
+  h.tick(1500);
+  EXPECT_EQ(h.needle().using_image(), &other);
+  EXPECT_LT(h.felt().worst_step_n, 0.05);
+  ASSERT_EQ(h.sample().mode, Mode::Haptic);
+  EXPECT_LT(step_of({.kind = CommandKind::Hold}, ReplyCode::Done), 0.05);
+  EXPECT_EQ(h.sample().mode, Mode::Hold);
+  h.tick(1000);
+  EXPECT_EQ(h.sample().mode, Mode::Hold);
+  EXPECT_LT(step_of({.kind = CommandKind::Haptic, .display = Display::FourChannel}, ReplyCode::Done), 0.05);
+  h.tick(1000);
+  EXPECT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
 }
 
 }  // namespace
