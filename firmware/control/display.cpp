@@ -10,7 +10,7 @@ namespace {
 
 // Backward Euler in B_v, f_e at the pose of this tick as in four_channel.
 Vec3 admittance(const AdmittanceConfig& config, SlaveState& slave, const DisplayInput& in) noexcept {
-  const Vec3 f_m =
+  Vec3 f_m =
       config.tracking.damping.cwiseProduct(slave.velocity - in.velocity) + config.tracking.stiffness.cwiseProduct(slave.pose - in.pose);
   const Vec3 push = config.slave.mass.cwiseProduct(slave.velocity) / in.dt_s + in.hand_force - in.environment_force;
   slave.velocity = push.cwiseQuotient(config.slave.mass / in.dt_s + config.slave.damping);

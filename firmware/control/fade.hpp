@@ -30,7 +30,7 @@ inline void begin(FadeState& state, const mechanism::Vec3& last, const mechanism
 }
 
 [[nodiscard]] inline mechanism::Vec3 update(const FadeConfig& config, FadeState& state, const mechanism::Vec3& law, double dt_s) noexcept {
-  const mechanism::Vec3 out = law + weight(config, state) * state.offset;
+  mechanism::Vec3 out = law + weight(config, state) * state.offset;
   state.time_s = std::min(state.time_s + dt_s, config.duration_s);
   return out;
 }

@@ -12,8 +12,8 @@ Vec3 adaptive_damping(const AdaptiveDamping& config, const Vec3& environment_for
 }
 
 Vec3 update(const FourChannelConfig& config, SlaveState& slave, const DisplayInput& in) noexcept {
-  const Vec3 f_m = config.master.damping.cwiseProduct(slave.velocity - in.velocity) +
-                   config.master.stiffness.cwiseProduct(slave.pose - in.pose) - in.environment_force;
+  Vec3 f_m = config.master.damping.cwiseProduct(slave.velocity - in.velocity) + config.master.stiffness.cwiseProduct(slave.pose - in.pose) -
+             in.environment_force;
 
   // Backward Euler against the master's pose of the next tick, for v the slave's velocity there:
   //   (M_s/dt + B + B_s + dt K) v = M_s/dt v_s + B v_m + K (x_m + dt v_m - x_s) + f_h - f_e,   B = damping of C_s + B_a

@@ -33,7 +33,7 @@ Vec3 update(const HapticConfig& config, HapticState& state, const DeviceState& d
   in.hand_force += weight(config.fade, state.fade) * state.slave_push;
   const Vec3 faded = update(config.fade, state.fade, update(config.display, state.display, in), dt_s);
   const Vec3 guarded = update(config.guard, state.guard, device.pose, faded, dt_s);
-  const Vec3 u = update(config.limits, state.limits, impedance_force(config.impedance, device, guarded), device.velocity, dt_s);
+  Vec3 u = update(config.limits, state.limits, impedance_force(config.impedance, device, guarded), device.velocity, dt_s);
   state.f_m = display_force(config.impedance, device, u);
   sent(state.guard, state.f_m);
   return u;

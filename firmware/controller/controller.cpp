@@ -316,6 +316,7 @@ ReplyCode Controller::begin_haptic(const Command& command) noexcept {
   if (needle_ == nullptr || !needle_->ready()) return ReplyCode::NoModel;
   control::DeviceState now;
   if (!device(now)) return ReplyCode::UnreachablePose;
+  haptic_config_.guard.step = one_count();
   if (mode_ == Mode::Haptic) {
     control::change(haptic_config_, haptic_, command.display, now);
   } else {
@@ -324,6 +325,14 @@ ReplyCode Controller::begin_haptic(const Command& command) noexcept {
   }
   raise(Trigger::HapticAccepted);
   return ReplyCode::Done;
+}
+
+// How far one count of one encoder moves the handle here, and a little.
+Vec3 Controller::one_count() const noexcept {
+  const double rad_per_count = 2.0 * std::numbers::pi / rig_.actuation.encoder_counts_per_turn;
+  const mechanism::Mat3 squared = joint_map_.transpose() * joint_map_;
+  const Eigen::Matrix<double, 3, 4> inverse = squared.inverse() * joint_map_.transpose();
+  return 1.1 * rad_per_count * inverse.cwiseAbs().rowwise().maxCoeff();
 }
 
 bool Controller::path_is_reachable(const Vec3& from, const Vec3& to) noexcept {
@@ -457,7 +466,7 @@ void Controller::supervise(const TickInput& input) noexcept {
   check(std::abs(base_wrench_[2]) > l.fault_moment_nm, Fault::ForceLimit, base_wrench_[2], l.fault_moment_nm);
   if (mode_ == Mode::Haptic) {
     check(needle_->unsolved_ticks() > most_unsolved_ticks, Fault::SolverNotConverged, needle_->unsolved_ticks(), most_unsolved_ticks);
-    check(haptic_.guard.energy_j < -haptic_config_.guard.bound_j, Fault::NotPassive, haptic_.guard.energy_j, -haptic_config_.guard.bound_j);
+    check(control::failed(haptic_config_.guard, haptic_.guard), Fault::NotPassive, haptic_.guard.energy_j, -haptic_config_.guard.bound_j);
   }
   if (position_controlled()) {
     const Vec3 e = motion_.reference().pose - state_.x;

@@ -83,6 +83,7 @@ class Controller {
   void control_position() noexcept;
   void control_haptic() noexcept;
   [[nodiscard]] bool device(control::DeviceState& device) const noexcept;
+  [[nodiscard]] mechanism::Vec3 one_count() const noexcept;
   void send(const mechanism::Vec4& friction_nm) noexcept;
   void stand_here() noexcept;
   void limit_and_send() noexcept;
