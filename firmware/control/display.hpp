@@ -16,6 +16,8 @@
 
 namespace trocar::control {
 
+using trocar::Display;
+
 struct AdmittanceConfig {
   VirtualSlave slave{};                                               // M_v, B_v
   LocalController tracking{{30.0, 30.0, 0.03}, {400.0, 400.0, 0.4}};  // C_t; ours

@@ -1,5 +1,6 @@
 #include "firmware/controller/controller.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
