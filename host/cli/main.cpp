@@ -214,6 +214,14 @@ int main(int argc, char** argv) {
   add_rig("status", "what the running controller is doing", [&] { return cli::rig_status(domain_of(), json); });
   add_rig("home", "take the encoder offsets; the handle stands in its jig", [&] { return cli::rig_home(domain_of()); });
   add_rig("arm", "enable torque and stay armed until Ctrl-C", [&] { return cli::rig_arm(domain_of(), stop_asked); });
+  std::string display = "four_channel";
+  add_rig("haptic",
+          "arm, and let a hand feel the model that trocar-rig was given, until Ctrl-C\nExample: trocar rig haptic --display impedance",
+          [&] { return cli::rig_haptic(domain_of(), display, stop_asked); });
+  rig_command->get_subcommand("haptic")
+      ->add_option("--display", display, "how: four_channel, impedance or admittance")
+      ->check(CLI::IsMember({"four_channel", "impedance", "admittance"}))
+      ->capture_default_str();
   add_rig("hold", "brake and hold; open to everybody", [&] { return cli::rig_hold(domain_of()); });
   add_rig("stop", "brake, then torque off; open to everybody", [&] { return cli::rig_stop(domain_of()); });
   add_rig("reset", "clear a latched fault whose cause is gone", [&] { return cli::rig_reset(domain_of()); });

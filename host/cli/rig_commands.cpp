@@ -128,14 +128,10 @@ int rig_hold(std::uint32_t domain) { return one_command(domain, CommandKind::Hol
 int rig_stop(std::uint32_t domain) { return one_command(domain, CommandKind::Stop); }
 int rig_reset(std::uint32_t domain) { return one_command(domain, CommandKind::ResetFault); }
 
-int rig_arm(std::uint32_t domain, std::atomic<bool>& stop) {
-  host::RigClient client(domain);
-  client.wait_for_rig(find_rig_s);
-  const host::RigReply armed = client.ask(CommandKind::Arm, answer_s);
-  if (say(armed) != 0) return 1;
-  fmt::print("armed; Ctrl-C disarms\n");
-  std::fflush(stdout);
-  Mode mode = armed.reply.mode;
+namespace {
+
+// Keeps the session alive and prints what happens until `stop`; then disarms.
+int stay_armed(host::RigClient& client, Mode mode, const std::atomic<bool>& stop) {
   bool lost = false;
   while (!stop.load() && !lost) {
     client.poll(0.01, {.status = [&](const host::RigStatus& s) {
@@ -153,6 +149,35 @@ int rig_arm(std::uint32_t domain, std::atomic<bool>& stop) {
     return 1;
   }
   return say(client.ask(CommandKind::Disarm, answer_s));
+}
+
+}  // namespace
+
+int rig_arm(std::uint32_t domain, std::atomic<bool>& stop) {
+  host::RigClient client(domain);
+  client.wait_for_rig(find_rig_s);
+  const host::RigReply armed = client.ask(CommandKind::Arm, answer_s);
+  if (say(armed) != 0) return 1;
+  fmt::print("armed; Ctrl-C disarms\n");
+  std::fflush(stdout);
+  return stay_armed(client, armed.reply.mode, stop);
+}
+
+int rig_haptic(std::uint32_t domain, const std::string& display, std::atomic<bool>& stop) {
+  host::RigClient client(domain);
+  client.wait_for_rig(find_rig_s);
+  if (say(client.ask(CommandKind::Arm, answer_s)) != 0) return 1;
+  Command command;
+  command.kind = CommandKind::Haptic;
+  command.display = display == "impedance" ? Display::Impedance : display == "admittance" ? Display::Admittance : Display::FourChannel;
+  const host::RigReply shown = client.ask(command, answer_s);
+  if (say(shown) != 0) {
+    (void)client.ask(CommandKind::Disarm, answer_s);
+    return 1;
+  }
+  fmt::print("the handle is the virtual needle's ({}); Ctrl-C disarms\n", display);
+  std::fflush(stdout);
+  return stay_armed(client, shown.reply.mode, stop);
 }
 
 }  // namespace trocar::cli

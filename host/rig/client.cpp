@@ -101,9 +101,13 @@ void RigClient::keep_alive() {
 
 RigReply RigClient::ask(CommandKind kind, double timeout_s, const std::string& gain_set) {
   Command command;
+  command.kind = kind;
+  return ask(command, timeout_s, gain_set);
+}
+
+RigReply RigClient::ask(Command command, double timeout_s, const std::string& gain_set) {
   command.session = session_;
   command.id = next_id_++;
-  command.kind = kind;
   send(command, gain_set);
   const double end = steady_s() + timeout_s;
   std::optional<RigReply> last;
@@ -115,7 +119,7 @@ RigReply RigClient::ask(CommandKind kind, double timeout_s, const std::string& g
     keep_alive();
   }
   throw config::UserError(fmt::format("the rig did not answer {} within {:g} s: is trocar-rig running, and is the machine overloaded?",
-                                      to_string(kind), timeout_s));
+                                      to_string(command.kind), timeout_s));
 }
 
 void RigClient::poll(double timeout_s, const Handlers& handlers) {

@@ -46,7 +46,8 @@ class RigClient {
   void send(const Command& command, const std::string& gain_set = {});  // session and id as given
   // Sends with this client's session and a new id and waits for the last word (not Accepted). Keeps the session alive meanwhile.
   RigReply ask(CommandKind kind, double timeout_s, const std::string& gain_set = {});
-  void keep_alive();  // at most every 10 ms; call it often while armed
+  RigReply ask(Command command, double timeout_s, const std::string& gain_set = {});  // session and id are set here
+  void keep_alive();                                                                  // at most every 10 ms; call it often while armed
 
   struct Handlers {
     std::function<void(const Sample&)> sample{};
