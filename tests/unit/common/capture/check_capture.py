@@ -123,13 +123,15 @@ def check(path, table):
 def compare_sample(cdr, row):
     sample = Xcdr2(cdr)
     sample.one("I")
-    values = list(sample.get("Qq" + "BBBB" + "I" + "i" * 4 + "d" * (4 + 4 + 3 * 6 + 2) + "Iff"))
+    values = list(sample.get("Qq" + "BBBB" + "I" + "i" * 4 + "d" * (4 + 4 + 3 * 6 + 2) + "Iff" + "d" * (3 * 3 + 1) + "BI"))
+    values[-2:] = values[-1], values[-2]  # the table has contacts before status
     row = list(row.values())
     assert len(row) == len(values) and sample.body.left() == 0
     assert row[2] == "Position" and values[2] == 3
-    for value, text in zip(values[:2] + values[4:-2], row[:2] + row[4:-2]):
+    singles = slice(len(row) - 14, len(row) - 12)  # wakeup_late_us, tick_us
+    for value, text in zip(values[:2] + values[4 : singles.start] + values[singles.stop :], row[:2] + row[4 : singles.start] + row[singles.stop :]):
         assert value == float(text), (value, text)
-    for value, text in zip(values[-2:], row[-2:]):
+    for value, text in zip(values[singles], row[singles]):
         assert struct.pack("<f", float(text)) == struct.pack("<f", value), (value, text)
 
 

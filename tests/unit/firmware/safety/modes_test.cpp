@@ -9,8 +9,9 @@ namespace trocar::safety {
 namespace {
 
 constexpr std::array modes{Mode::Off, Mode::Ready, Mode::Armed, Mode::Position, Mode::Haptic, Mode::Hold, Mode::Fault};
-constexpr std::array triggers{Trigger::LinkUp,    Trigger::LinkDown,       Trigger::TorqueEnabled, Trigger::MoveAccepted,
-                              Trigger::HoldAsked, Trigger::TorqueOffAsked, Trigger::FaultRaised,   Trigger::FaultReset};
+constexpr std::array triggers{Trigger::LinkUp,         Trigger::LinkDown,       Trigger::TorqueEnabled,
+                              Trigger::MoveAccepted,   Trigger::HapticAccepted, Trigger::HoldAsked,
+                              Trigger::TorqueOffAsked, Trigger::FaultRaised,    Trigger::FaultReset};
 
 TEST(Modes, EveryRowHappensAndNothingElseDoes) {
   // Written a second time by hand, from the mode diagram: per trigger, where each mode goes.
@@ -20,6 +21,10 @@ TEST(Modes, EveryRowHappensAndNothingElseDoes) {
       {{Mode::Ready, Trigger::TorqueEnabled}, Mode::Armed},
       {{Mode::Armed, Trigger::MoveAccepted}, Mode::Position},
       {{Mode::Hold, Trigger::MoveAccepted}, Mode::Position},
+      {{Mode::Armed, Trigger::HapticAccepted}, Mode::Haptic},
+      {{Mode::Position, Trigger::HapticAccepted}, Mode::Haptic},
+      {{Mode::Hold, Trigger::HapticAccepted}, Mode::Haptic},
+      {{Mode::Haptic, Trigger::HapticAccepted}, Mode::Haptic},
       {{Mode::Armed, Trigger::HoldAsked}, Mode::Hold},
       {{Mode::Position, Trigger::HoldAsked}, Mode::Hold},
       {{Mode::Haptic, Trigger::HoldAsked}, Mode::Hold},
