@@ -33,9 +33,9 @@ class Flexible {
   static constexpr int max_iterations = 24;   // of Newton
   static constexpr int exact_iterations = 8;  // after which, or when they arrive at no stable state, the convex tangent is tried
   static constexpr double gain = 10.0;
-  static constexpr double slow = 4.0;          // a gain below this is slow
-  static constexpr double least_nudge_rad = 1e-3;    // out of an unstable equilibrium
-  static constexpr double part_way = 0.25;     // of the base's motion that is tried where the whole of it leads nowhere
+  static constexpr double slow = 4.0;              // a gain below this is slow
+  static constexpr double least_nudge_rad = 1e-3;  // out of an unstable equilibrium
+  static constexpr double part_way = 0.25;         // of the base's motion that is tried where the whole of it leads nowhere
   static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
   static constexpr double beam_tolerance_nm = 1e-11;
 

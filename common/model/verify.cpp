@@ -231,8 +231,8 @@ ImageStatus verify(const Image& image) noexcept {
   if (!tissue_ok(t)) return ImageStatus::BadTissue;
   if (!positive(image.needle.length_m) || !not_negative(image.needle.radius_m)) return ImageStatus::BadNeedle;
   const Needle& needle = image.needle;
-  if (needle.elements > capacity::needle_elements || !std::isfinite(needle.curvature_per_m) || !std::isfinite(needle.tip_lateral) || !std::isfinite(needle.face_rad) ||
-      (needle.elements > 0 && !(positive(needle.bending_nm2) && positive(needle.axial_n))))
+  if (needle.elements > capacity::needle_elements || !std::isfinite(needle.curvature_per_m) || !std::isfinite(needle.tip_lateral) ||
+      !std::isfinite(needle.face_rad) || (needle.elements > 0 && !(positive(needle.bending_nm2) && positive(needle.axial_n))))
     return ImageStatus::BadNeedle;
   const Need& need = image.need;
   if (t.node_m.size() > max_nodes || need.contacts > capacity::contacts || need.cells_per_bucket > capacity::cells_per_bucket ||

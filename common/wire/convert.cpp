@@ -171,8 +171,7 @@ Command to_wire(const trocar::Command& command, std::string_view gain_set, std::
 
 ReplyCode from_wire(const Command& command, std::span<const std::string_view> gain_sets, std::int64_t now_ns,
                     trocar::Command& out) noexcept {
-  if (command.protocol != protocol_version || command.kind > last_command || command.display > last_display)
-    return ReplyCode::WrongVersion;
+  if (command.protocol != protocol_version || command.kind > last_command || command.display > last_display) return ReplyCode::WrongVersion;
   // Compared without adding, so that a hostile sent_ns cannot overflow.
   const std::int64_t allowed_ns = std::int64_t{command.deadline_ms} * 1'000'000;
   if (command.deadline_ms != 0 && command.sent_ns < now_ns - allowed_ns) return ReplyCode::Expired;

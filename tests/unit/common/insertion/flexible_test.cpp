@@ -145,7 +145,7 @@ TEST(Flexible, StaysInNoUnstableEquilibrium) {
     EXPECT_GT(std::abs(hand.result().tip.theta_rad - hand.pose.theta_rad), 1e-4);
   }
   EXPECT_NEAR(thrust_n[0] / thrust_n[1], 1.0, 0.05);  // they snap at slightly other depths, and friction remembers
-  EXPECT_LT(thrust_n[0], 1.0);  // upright it would be the friction of 55 mm, 1.8 N
+  EXPECT_LT(thrust_n[0], 1.0);                        // upright it would be the friction of 55 mm, 1.8 N
 }
 
 // Reported forces are parts along and across the shaft as it stands: together they are the base's.
