@@ -123,7 +123,6 @@ bool Flexible::aim(const contact::WorkingSet& set, std::span<contact::Target> ta
   const contact::Solution solution = joined_.solve(target.first(n));
   outcome.pivots += solution.pivots;
   outcome.solves += solution.iterations;
-  outcome.contacts = solution.status;
   outcome.solved_n = solution.residual_n;
   return solution.status != contact::SolverStatus::NotFinite;
 }

@@ -9,9 +9,11 @@
 //   Warm start: the last tick's bend, forces, states and slips.
 //   Chord method: K, B and the factor of G + B serve until an iteration gains less than a factor of `gain`; then they are made anew.
 //   Friction turns with the shaft and loads slide along it; the quick step learns of that an iteration late. Where it contracts slowly, a
-//   very flexible needle, Newton's full step (whole.cpp) takes over once the states stand. Under thrust beyond buckling K and B are
-//   indefinite and the tissue holds the needle; what is found is stable where G + B has as many negative eigenvalues as K (Haynsworth).
-//   Where Newton does not arrive so, it starts again from the last tick with the convex part of K.
+//   very flexible needle, Newton's full step (whole.cpp) takes over once the states stand.
+//   Under thrust beyond buckling K and B are indefinite and the tissue holds the needle; an equilibrium is stable where G + B has as many
+//   negative eigenvalues as K (Haynsworth). A step towards one that is not takes the convex part of K instead, and one that was reached
+//   is left by a nudge to a side.
+//   A base whose pose leads nowhere is approached by a quarter of its way a tick.
 #pragma once
 
 #include <array>
@@ -30,8 +32,7 @@ using Jacobian = std::array<std::array<double, 3>, 3>;
 
 class Flexible {
  public:
-  static constexpr int max_iterations = 24;   // of Newton
-  static constexpr int exact_iterations = 8;  // after which, or when they arrive at no stable state, the convex tangent is tried
+  static constexpr int max_iterations = 24;  // of Newton towards a pose; as many again towards a part of the way
   static constexpr double gain = 10.0;
   static constexpr double slow = 4.0;              // a gain below this is slow
   static constexpr double least_nudge_rad = 1e-3;  // out of an unstable equilibrium
@@ -40,7 +41,6 @@ class Flexible {
   static constexpr double beam_tolerance_nm = 1e-11;
 
   struct Outcome {
-    contact::SolverStatus contacts{contact::SolverStatus::Ok};
     bool converged{};  // otherwise bend and forces are those of the last converged tick, carried on rigidly
     int iterations{};  // of Newton
     int pivots{};
@@ -60,7 +60,7 @@ class Flexible {
   [[nodiscard]] const needle::Beam& beam() const noexcept { return beam_; }
   // d(tip x, y, theta) / d(base x, y, theta), m and rad, of the last step: differentiated implicitly at its states, where a contact that
   // slips goes on slipping and one that sticks goes on sticking. False when the equations are singular. Dense: (3 contacts)^3 / 3
-  // operations, about 0.3 ms with 32; not for every tick. Leaves bend and forces as they are.
+  // operations, some 0.06 ms with 32; not for every tick. Leaves bend and forces as they are.
   bool jacobian(const needle::Pose& base, const contact::WorkingSet& set, Jacobian& out) noexcept;
   // Where on the shaft, or its straight continuation, the point at x_m stands; searched from `near_m` on.
   [[nodiscard]] double arclength_m(const contact::Vector2& x_m, double near_m) const noexcept;
