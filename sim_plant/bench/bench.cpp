@@ -51,7 +51,9 @@ void Bench::tick() noexcept {
     step_plant(t);
     answered = link_.poll(t);
   }
-  link_.end_tick(t, controller_.tick({begin_ns, 0, &link_.feedback()}));
+  const hal::LinkCommand& command = controller_.tick({begin_ns, 0, &link_.feedback()});
+  link_.end_tick(t, late_ ? held_ : command);
+  held_ = command;
   while (t + step_ns <= begin_ns + period_ns) {
     t += step_ns;
     step_plant(t);

@@ -23,6 +23,8 @@ class Bench {
 
   // From now on this hand holds the handle; nullptr: nobody.
   void give_to(Hand* hand) noexcept { hand_ = hand; }
+  // Drives get every command a tick later than they should.
+  void delay_commands(bool late) noexcept { late_ = late; }
 
   // One controller period. Afterwards sample() is the tick's, and mail() has what the controller said.
   void tick() noexcept;
@@ -44,6 +46,8 @@ class Bench {
   controller::Controller controller_;
   WiredPlant plant_;
   Hand* hand_{nullptr};
+  bool late_{false};
+  hal::LinkCommand held_{};
   std::int64_t now_ns_{};
 };
 

@@ -30,7 +30,7 @@ struct Felt {
 
 class Haptics {
  public:
-  explicit Haptics(int encoder_counts = 16000) : hand_({}, pose_of(rig_)) {
+  explicit Haptics(int encoder_counts = 16000, const HandConfig& hand = {}) : hand_(hand, pose_of(rig_)) {
     rig_.actuation.encoder_counts_per_turn = encoder_counts;
     // Nothing stands in front of the machine itself.
     scene::Scene air = scene_;
@@ -70,6 +70,7 @@ class Haptics {
     hand_.hold(bench_->plant().physics().pose());
     bench_->give_to(&hand_);
   }
+  void delay_commands() { bench_->delay_commands(true); }
   void want(const std::vector<std::pair<double, Pose>>& way) {
     std::vector<Intention> points{{now_s(), bench_->plant().physics().pose()}};
     for (const auto& [seconds, pose] : way) points.push_back({points.back().time_s + seconds, pose});
@@ -149,6 +150,36 @@ TEST(HapticLoop, APersonPushesTheVirtualNeedleInAndDrawsItOut) {
     EXPECT_GT(felt.least_energy_j, -0.005);
     EXPECT_EQ(felt.unsolved, 0);
   }
+}
+
+// Held still in the tissue by hands of half and twice the usual impedance, coarse encoders, drives a millisecond late.
+TEST(HapticLoop, IsCalmWithCoarseEncodersLateDrivesAndOtherHands) {
+  for (const Display display : {Display::FourChannel, Display::Impedance, Display::Admittance})
+    for (const int counts : {4000, 16000})
+      for (const double impedance : {0.5, 2.0}) {
+        Haptics h(counts, scaled({}, impedance));
+        h.arm();
+        h.take();
+        h.tick(300);
+        h.delay_commands();
+        h.send({.kind = CommandKind::Haptic, .display = display}, 500);
+        Pose deep = h.sample().pose;
+        deep[1] = 0.18;
+        h.want({{2.0, deep}});
+        h.tick(3500);
+        double most = -1e9, least = 1e9, e = 1e9;
+        for (int k = 0; k < 1000; ++k) {
+          h.tick(1);
+          most = std::max(most, h.hand().wrench()[1]);
+          least = std::min(least, h.hand().wrench()[1]);
+          e = std::min(e, h.felt().least_energy_j);
+        }
+        SCOPED_TRACE(testing::Message() << "display " << static_cast<int>(display) << ", " << counts << " counts, hand " << impedance);
+        EXPECT_EQ(h.sample().mode, Mode::Haptic) << to_string(h.sample().fault);
+        EXPECT_GT(e, -0.01);
+        // With a quarter of the rig's counts a light hand is shaken by up to 0.25 N where the slave has a mass of its own.
+        EXPECT_LT(0.5 * (most - least), counts == 4000 && display != Display::Impedance ? 0.3 : 0.1);
+      }
 }
 
 TEST(HapticLoop, WantsAModelAndTheSession) {
