@@ -550,7 +550,8 @@ Solution Solver::solve(std::span<const Target> target) noexcept {
   // Whether the last forces are the solution of this tick too: the first contact that they do not hold settles it.
   judge(target, settled_n, v);
   const bool rests = v.count == 0 && v.residual_n <= settled_n;
-  const bool limited = !rests && !exchange(target, v, solution) && !descend(target, v, solution);
+  // Where something in series makes M indefinite, no energy falls along a descent.
+  const bool limited = !rests && !exchange(target, v, solution) && (joined_ || !descend(target, v, solution));
   if (limited) {
     cut_to_bounds(target);
     evaluate();
