@@ -36,69 +36,46 @@ void copy_text(std::span<char> to, std::string_view text) noexcept {
   to[size] = '\0';
 }
 
-Sample to_wire(const trocar::Sample& sample) noexcept {
-  Sample out{};
-  out.tick = sample.tick;
-  out.time_ns = sample.time_ns;
-  out.mode = static_cast<std::uint8_t>(sample.mode);
-  out.fault = static_cast<std::uint8_t>(sample.fault);
-  out.moving = sample.moving;
-  out.gain_set = sample.gain_set;
-  out.command_id = sample.command_id;
-  copy(out.position_counts, sample.position_counts);
-  copy(out.joint_torque_command_nm, sample.joint_torque_command_nm);
-  copy(out.joint_torque_measured_nm, sample.joint_torque_measured_nm);
-  copy(out.pose, sample.pose);
-  copy(out.velocity, sample.velocity);
-  copy(out.setpoint_pose, sample.setpoint_pose);
-  copy(out.setpoint_velocity, sample.setpoint_velocity);
-  copy(out.wrench_command, sample.wrench_command);
-  copy(out.base_wrench, sample.base_wrench);
-  out.residual_m = sample.residual_m;
-  out.singularity = sample.singularity;
-  out.missed_feedback = sample.missed_feedback;
-  out.wakeup_late_us = sample.wakeup_late_us;
-  out.tick_us = sample.tick_us;
-  copy(out.handle_wrench, sample.handle_wrench);
-  copy(out.virtual_pose, sample.virtual_pose);
-  copy(out.virtual_wrench, sample.virtual_wrench);
-  out.display_energy_j = sample.display_energy_j;
-  out.virtual_contacts = sample.virtual_contacts;
-  out.virtual_status = sample.virtual_status;
-  return out;
+namespace {
+
+// Both ways: the two have the same fields under the same names.
+template <class To, class From>
+To sample_as(const From& from) noexcept {
+  To to{};
+  to.tick = from.tick;
+  to.time_ns = from.time_ns;
+  to.mode = static_cast<decltype(to.mode)>(from.mode);
+  to.fault = static_cast<decltype(to.fault)>(from.fault);
+  to.moving = from.moving;
+  to.gain_set = from.gain_set;
+  to.command_id = from.command_id;
+  copy(to.position_counts, from.position_counts);
+  copy(to.joint_torque_command_nm, from.joint_torque_command_nm);
+  copy(to.joint_torque_measured_nm, from.joint_torque_measured_nm);
+  copy(to.pose, from.pose);
+  copy(to.velocity, from.velocity);
+  copy(to.setpoint_pose, from.setpoint_pose);
+  copy(to.setpoint_velocity, from.setpoint_velocity);
+  copy(to.wrench_command, from.wrench_command);
+  copy(to.base_wrench, from.base_wrench);
+  to.residual_m = from.residual_m;
+  to.singularity = from.singularity;
+  to.missed_feedback = from.missed_feedback;
+  to.wakeup_late_us = from.wakeup_late_us;
+  to.tick_us = from.tick_us;
+  copy(to.handle_wrench, from.handle_wrench);
+  copy(to.virtual_pose, from.virtual_pose);
+  copy(to.virtual_wrench, from.virtual_wrench);
+  to.display_energy_j = from.display_energy_j;
+  to.virtual_contacts = from.virtual_contacts;
+  to.virtual_status = from.virtual_status;
+  return to;
 }
 
-trocar::Sample from_wire(const Sample& sample) noexcept {
-  trocar::Sample out{};
-  out.tick = sample.tick;
-  out.time_ns = sample.time_ns;
-  out.mode = static_cast<Mode>(sample.mode);
-  out.fault = static_cast<Fault>(sample.fault);
-  out.moving = sample.moving;
-  out.gain_set = sample.gain_set;
-  out.command_id = sample.command_id;
-  copy(out.position_counts, sample.position_counts);
-  copy(out.joint_torque_command_nm, sample.joint_torque_command_nm);
-  copy(out.joint_torque_measured_nm, sample.joint_torque_measured_nm);
-  copy(out.pose, sample.pose);
-  copy(out.velocity, sample.velocity);
-  copy(out.setpoint_pose, sample.setpoint_pose);
-  copy(out.setpoint_velocity, sample.setpoint_velocity);
-  copy(out.wrench_command, sample.wrench_command);
-  copy(out.base_wrench, sample.base_wrench);
-  out.residual_m = sample.residual_m;
-  out.singularity = sample.singularity;
-  out.missed_feedback = sample.missed_feedback;
-  out.wakeup_late_us = sample.wakeup_late_us;
-  out.tick_us = sample.tick_us;
-  copy(out.handle_wrench, sample.handle_wrench);
-  copy(out.virtual_pose, sample.virtual_pose);
-  copy(out.virtual_wrench, sample.virtual_wrench);
-  out.display_energy_j = sample.display_energy_j;
-  out.virtual_contacts = sample.virtual_contacts;
-  out.virtual_status = sample.virtual_status;
-  return out;
-}
+}  // namespace
+
+Sample to_wire(const trocar::Sample& sample) noexcept { return sample_as<Sample>(sample); }
+trocar::Sample from_wire(const Sample& sample) noexcept { return sample_as<trocar::Sample>(sample); }
 
 Event to_wire(const trocar::Event& event, std::string_view text) noexcept {
   Event out{};

@@ -1,5 +1,6 @@
 // The controller: one tick is a pure function of (state, inputs, time), in causal order
 //   acquire -> observe -> commands -> supervise -> control -> limit -> send.
+// controller.cpp is the tick; commands.cpp is what commands ask of it, and the replies that come later.
 // No allocation, exception, lock or system call; every loop is bounded by a capacity. The same object runs in trocar-rig and in
 // the lock-step bench.
 #pragma once
@@ -64,6 +65,8 @@ class Controller {
   [[nodiscard]] Status status() const noexcept;
 
  private:
+  static constexpr std::uint32_t rest_ticks_needed = 50;
+
   void acquire(const TickInput& input) noexcept;
   void observe() noexcept;
   void observe_force() noexcept;

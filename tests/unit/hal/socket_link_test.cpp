@@ -87,7 +87,8 @@ TEST_F(SocketLinkTest, EnablesFourDrivesOverUdp) {
 }
 
 TEST_F(SocketLinkTest, EnablesFourDrivesOverSocketCan) {
-  if (::if_nametoindex("vcan0") == 0 || ::if_nametoindex("vcan1") == 0) GTEST_SKIP() << "no vcan0, vcan1 here";
+  // Only a kernel with the vcan module has such an interface, and a process cannot bring one along.
+  if (::if_nametoindex("vcan0") == 0 || ::if_nametoindex("vcan1") == 0) GTEST_SKIP() << "no vcan0, vcan1 here: load vcan and bring them up";
   open(can_endpoint("vcan0"), can_endpoint("vcan1"));
   run_to_enabled();
 }
