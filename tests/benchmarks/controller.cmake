@@ -1,5 +1,5 @@
 add_executable(controller_benchmark controller_benchmark.cpp)
-target_link_libraries(controller_benchmark PRIVATE trocar_options firmware_controller firmware_control firmware_safety hal common_core common_rig common_mechanism common_config
+target_link_libraries(controller_benchmark PRIVATE trocar_options firmware_controller firmware_control firmware_safety firmware_virtual_needle hal common_core common_rig common_mechanism common_config
   sim_plant_bench sim_plant_plant benchmark::benchmark benchmark::benchmark_main)
 target_include_directories(controller_benchmark PRIVATE ${CMAKE_SOURCE_DIR}/tests/unit/firmware/controller)
 target_compile_definitions(controller_benchmark PRIVATE TROCAR_SHARE="${CMAKE_SOURCE_DIR}/host/share")

@@ -10,6 +10,7 @@
 #include "common/config/rig_file.hpp"
 #include "common/mechanism/twin.hpp"
 #include "firmware/controller/controller.hpp"
+#include "firmware/virtual_needle/virtual_needle.hpp"
 
 namespace trocar::controller {
 
@@ -22,7 +23,8 @@ struct FakeRig {
 
   rig::Rig rig = shipped_rig();
   std::unique_ptr<Mailboxes> mail = std::make_unique<Mailboxes>();
-  std::unique_ptr<Controller> controller = std::make_unique<Controller>(rig, *mail, true);
+  virtual_needle::VirtualNeedle needle{};  // without a model until a test offers one
+  std::unique_ptr<Controller> controller = std::make_unique<Controller>(rig, *mail, true, &needle);
   hal::Feedback feedback{};
   hal::LinkCommand out{};
   std::int64_t now_ns{};

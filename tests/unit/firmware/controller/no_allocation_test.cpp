@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <new>
 
+#include "common/condense/compile.hpp"
+#include "common/scene/scene.hpp"
 #include "fake_rig.hpp"
 
 namespace {
@@ -58,6 +61,39 @@ TEST(NoAllocation, InAnyTick) {
   f.mail->commands.push({.session = FakeRig::host, .id = 4, .kind = CommandKind::Home});
   tick(f, 10);
   EXPECT_TRUE(f.controller->status().homed);
+  EXPECT_EQ(allocations_in_tick, 0u);
+}
+
+// The tip stands in the virtual tissue; models are taken, displays change, hold and back.
+TEST(NoAllocation, InAnyTickOfHaptic) {
+  scene::Scene scene = scene::read_scene(std::filesystem::path(TROCAR_SHARE) / "scenes/phantom.toml");
+  for (double& y : scene.tissue.grid->axis_m[1]) y -= 0.03;
+  condense::Options options;
+  options.visible = condense::WithVisible::No;
+  const image_file::AlignedBytes bytes = condense::compile_to_memory(scene, options).image;
+  model::Image image{};
+  ASSERT_EQ(model::open(bytes.span(), image), model::ImageStatus::Ok);
+  image.needle.elements = 24;  // 22G
+  image.needle.bending_nm2 = 2.3e-3;
+  image.needle.axial_n = 5e4;
+  const model::Image other = image;
+  FakeRig f;
+  f.needle.offer(&image);
+  f.positioned();
+  allocations_in_tick = 0;
+  std::uint32_t id = 1;
+  for (const Display display : {Display::FourChannel, Display::Impedance, Display::Admittance}) {
+    f.mail->commands.push({.session = FakeRig::host, .id = id++, .kind = CommandKind::Haptic, .display = display});
+    tick(f, 200);
+    EXPECT_EQ(f.mode(), Mode::Haptic);
+    EXPECT_GT(f.controller->sample().virtual_contacts, 1u);
+  }
+  f.needle.offer(&other);
+  tick(f, 50);
+  EXPECT_EQ(f.needle.using_image(), &other);
+  f.mail->commands.push({.session = FakeRig::host, .id = id++, .kind = CommandKind::Hold});
+  tick(f, 50);
+  EXPECT_EQ(f.mode(), Mode::Hold);
   EXPECT_EQ(allocations_in_tick, 0u);
 }
 
