@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -12,17 +11,13 @@
 #include "tests/benchmarks/accuracy/course.hpp"
 #include "tests/benchmarks/accuracy/output.hpp"
 #include "tests/benchmarks/accuracy/solid.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
 
 using contact::Method;
 constexpr Method methods[] = {Method::Snap, Method::Adapt, Method::Embedded, Method::Subdivide};
-
-struct Options {
-  std::filesystem::path out{};
-  bool quick{};
-};
 
 const char* element_name(fem::Type type) { return type == fem::Type::Tri3 ? "tri3" : "quad4"; }
 
@@ -180,24 +175,9 @@ bool Bench::finish() {
   return worst_mn <= 25.0;
 }
 
-int run(int count, char** argument) {
-  Options options;
-  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
-  for (int k = 1; k < count; ++k) {
-    if (std::strcmp(argument[k], "--quick") == 0) {
-      options.quick = true;
-    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
-      options.out = argument[++k];
-    } else {
-      fmt::print(stderr, "accuracy_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
-      return 2;
-    }
-  }
+int run(const Options& options) {
   Bench bench(options);
-  const auto step = [](const char* what, auto work) {
-    fmt::print(stderr, "accuracy_benchmark: {} …\n", what);
-    work();
-  };
+  const auto step = [](const char* what, const std::function<void()>& work) { bench::step("accuracy_benchmark", what, work); };
   step("fine conforming meshes", [&] { bench.references(); });
   step("path methods", [&] { bench.errors(); });
   step("a solid", [&] { bench.solids(); });
@@ -207,11 +187,4 @@ int run(int count, char** argument) {
 }  // namespace
 }  // namespace trocar::bench
 
-int main(int count, char** argument) {
-  try {
-    return trocar::bench::run(count, argument);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "accuracy_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int count, char** argument) { return trocar::bench::run_program("accuracy_benchmark", count, argument, trocar::bench::run); }

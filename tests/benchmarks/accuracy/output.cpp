@@ -4,23 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <stdexcept>
 
 #include "host/report/gnuplot.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
 
 // Columns of accuracy_error.csv: 1 path, 2 element, 3 side, 4 method, 5 tick_us, 8 axial_stiffness, 9 lateral_stiffness, 12 visible_slip,
 // 13 slip_force.

@@ -5,7 +5,6 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -16,17 +15,12 @@
 #include "tests/benchmarks/contact/whole_step.hpp"
 #include "tests/benchmarks/partner/full_system.hpp"
 #include "tests/benchmarks/partner/sheet.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
 
 using enum Ratio::Goal;
-
-struct Options {
-  std::filesystem::path out{};
-  bool quick{};
-  [[nodiscard]] int turns(int full) const { return quick ? 3 : full; }
-};
 
 Scene scene_on(const partner::Sheet& sheet, std::size_t contacts, std::vector<int>* chosen = nullptr) {
   const std::vector<int> nodes = partner::axis_nodes(sheet, contacts);
@@ -346,24 +340,9 @@ void Bench::finish() {
   fmt::print("\ntables and figures: {}\n", options_.out.string());
 }
 
-int run(int count, char** argument) {
-  Options options;
-  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
-  for (int k = 1; k < count; ++k) {
-    if (std::strcmp(argument[k], "--quick") == 0) {
-      options.quick = true;
-    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
-      options.out = argument[++k];
-    } else {
-      fmt::print(stderr, "contact_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
-      return 2;
-    }
-  }
+int run(const Options& options) {
   Bench bench(options);
-  const auto step = [](const char* what, auto work) {
-    fmt::print(stderr, "contact_benchmark: {} …\n", what);
-    work();
-  };
+  const auto step = [](const char* what, const std::function<void()>& work) { bench::step("contact_benchmark", what, work); };
   step("ticks at 32 contacts", [&] { bench.contact_ticks(); });
   step("the whole mesh, 10,000 nodes", [&] { bench.whole_mesh(); });
   step("4 to 64 contacts", [&] { bench.sizes(); });
@@ -377,11 +356,4 @@ int run(int count, char** argument) {
 }  // namespace
 }  // namespace trocar::bench
 
-int main(int count, char** argument) {
-  try {
-    return trocar::bench::run(count, argument);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "contact_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int count, char** argument) { return trocar::bench::run_program("contact_benchmark", count, argument, trocar::bench::run); }

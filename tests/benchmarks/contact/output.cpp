@@ -2,23 +2,11 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
-#include <stdexcept>
-
 #include "host/report/gnuplot.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
 
 constexpr const char* figures = R"(
 set datafile separator ','

@@ -7,31 +7,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <vector>
 
 #include "tests/benchmarks/haptic/output.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
 
 using control::Display;
 
-int run(int count, char** argument) {
-  std::filesystem::path out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
-  bool quick = false;
-  for (int k = 1; k < count; ++k) {
-    if (std::strcmp(argument[k], "--quick") == 0) {
-      quick = true;
-    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
-      out = argument[++k];
-    } else {
-      fmt::print(stderr, "haptic_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
-      return 2;
-    }
-  }
-
+int run(const Options& options) {
   fmt::print(stderr, "haptic_benchmark: passive walls …\n");
   // 2 N s/m: a light hand's least damping, counted to the device; the hands that try the loop have none.
   reference::AxisPlant device;
@@ -40,7 +27,8 @@ int run(int count, char** argument) {
   const std::vector<Scheme> schemes{{"two channels", Display::Impedance, 0.0},
                                     {"four channels", Display::FourChannel, 0.0},
                                     {"four channels at 2 N", Display::FourChannel, 120.0}};
-  const std::vector<double> dampings = quick ? std::vector{0.0, 5.0} : std::vector{0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
+  const std::vector<double> dampings =
+      options.quick ? std::vector{0.0, 5.0} : std::vector{0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
   std::vector<WallRow> walls;
   for (const Scheme& scheme : schemes)
     for (const double hz : {512.0, 1000.0, 2000.0, 4000.0})
@@ -80,19 +68,12 @@ int run(int count, char** argument) {
   fmt::print("\nbare spring against b / (1.5 T): {}\n", sound ? "agrees" : "DISAGREES");
   fmt::print("felt stiffness, worst error: two channels {:.2f} %, four channels {:.2f} %, admittance against the series {:.2f} %\n",
              100.0 * two_off, 100.0 * four_off, 100.0 * series_off);
-  write(out, walls, felt, free);
-  fmt::print("tables and figures: {}\n", out.string());
+  write(options.out, walls, felt, free);
+  fmt::print("tables and figures: {}\n", options.out.string());
   return sound && two_off <= 0.02 && series_off <= 0.02 ? 0 : 1;
 }
 
 }  // namespace
 }  // namespace trocar::bench
 
-int main(int count, char** argument) {
-  try {
-    return trocar::bench::run(count, argument);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "haptic_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int count, char** argument) { return trocar::bench::run_program("haptic_benchmark", count, argument, trocar::bench::run); }

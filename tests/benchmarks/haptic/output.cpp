@@ -2,11 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
-#include <stdexcept>
 #include <string>
 
 #include "host/report/gnuplot.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
@@ -36,16 +35,6 @@ csv = folder.'/haptic_felt.csv'
 schemes = '"two channels" admittance "four channels"'
 plot x title 'exact' lc 'gray', for [s in schemes] csv skip 1 using (strcol(1) eq s ? $2 : NaN):3 with linespoints pt 7 title s
 )";
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
 
 }  // namespace
 

@@ -6,7 +6,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -21,6 +20,7 @@
 #include "tests/benchmarks/needle/elastica.hpp"
 #include "tests/benchmarks/needle/output.hpp"
 #include "tests/benchmarks/needle/thesis_figure.hpp"
+#include "tests/benchmarks/program/program.hpp"
 #include "tests/reference/grid_image/grid_image.hpp"
 
 namespace trocar::bench {
@@ -30,12 +30,6 @@ constexpr double length = 0.15;
 constexpr double bending = 5.375e-3;  // 20G steel
 constexpr double inextensible = 1e13;
 constexpr double axial = 7.24e4;
-
-struct Options {
-  std::filesystem::path out{};
-  bool quick{};
-  [[nodiscard]] int turns(int full) const { return quick ? 3 : full; }
-};
 
 class Bench {
  public:
@@ -243,24 +237,9 @@ bool Bench::finish() {
   return worst_at_16_ <= 1e-3 && thesis_.error_met;
 }
 
-int run(int count, char** argument) {
-  Options options;
-  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
-  for (int k = 1; k < count; ++k) {
-    if (std::strcmp(argument[k], "--quick") == 0) {
-      options.quick = true;
-    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
-      options.out = argument[++k];
-    } else {
-      fmt::print(stderr, "needle_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
-      return 2;
-    }
-  }
+int run(const Options& options) {
   Bench bench(options);
-  const auto step = [](const char* what, auto work) {
-    fmt::print(stderr, "needle_benchmark: {} …\n", what);
-    work();
-  };
+  const auto step = [](const char* what, const std::function<void()>& work) { bench::step("needle_benchmark", what, work); };
   step("elastica, 2 to 64 elements", [&] { bench.elastica_table(); });
   step("figure 5.13 of the thesis", [&] { bench.figure_of_the_thesis(); });
   step("parts of a tick", [&] { bench.parts_of_a_tick(); });
@@ -271,11 +250,4 @@ int run(int count, char** argument) {
 }  // namespace
 }  // namespace trocar::bench
 
-int main(int count, char** argument) {
-  try {
-    return trocar::bench::run(count, argument);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "needle_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int count, char** argument) { return trocar::bench::run_program("needle_benchmark", count, argument, trocar::bench::run); }

@@ -2,10 +2,8 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
-#include <stdexcept>
-
 #include "host/report/gnuplot.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
@@ -31,16 +29,6 @@ plot for [method in 'ours thesis'] csv skip 1 using (strcol(1) eq 'figure 5.13' 
 )";
 
 }  // namespace
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
 
 void print(const std::vector<BendRow>& rows) {
   fmt::print("{:<12} {:<8} {:>8} {:>8} {:>12} {:>7} {:>10} {:>12} {:>24}\n", "scene", "method", "elements", "load", "error / L", "order",

@@ -5,7 +5,6 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
@@ -17,14 +16,10 @@
 #include "tests/benchmarks/observer/judge.hpp"
 #include "tests/benchmarks/observer/output.hpp"
 #include "tests/benchmarks/observer/times.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
-
-struct Options {
-  std::filesystem::path out{};
-  bool quick{};
-};
 
 sim_plant::StopConfig stops(const rig::Rig& rig) { return {rig.limits.workspace_x_m, rig.limits.workspace_y_m, 5e4, 150.0, 0.2}; }
 
@@ -81,19 +76,7 @@ std::vector<TraceRow> trace_of(const Course& course, const rig::Rig& rig) {
   return trace;
 }
 
-int run(int count, char** argument) {
-  Options options;
-  options.out = std::filesystem::weakly_canonical(std::filesystem::path(argument[0])).parent_path().parent_path() / "bench";
-  for (int k = 1; k < count; ++k) {
-    if (std::strcmp(argument[k], "--quick") == 0) {
-      options.quick = true;
-    } else if (std::strcmp(argument[k], "--out") == 0 && k + 1 < count) {
-      options.out = argument[++k];
-    } else {
-      fmt::print(stderr, "observer_benchmark: unknown option \"{}\"; there are: --out FOLDER, --quick\n", argument[k]);
-      return 2;
-    }
-  }
+int run(const Options& options) {
   const std::filesystem::path share(TROCAR_SHARE);
   const rig::Rig rig = config::read_twin(share / "rigs/ubc_twin_haptic.toml");
   const rig::Rig own = config::read_twin(share / "rigs/ubc_twin.toml");
@@ -128,11 +111,4 @@ int run(int count, char** argument) {
 }  // namespace
 }  // namespace trocar::bench
 
-int main(int count, char** argument) {
-  try {
-    return trocar::bench::run(count, argument);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "observer_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int count, char** argument) { return trocar::bench::run_program("observer_benchmark", count, argument, trocar::bench::run); }

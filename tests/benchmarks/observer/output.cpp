@@ -3,11 +3,10 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <fstream>
-#include <stdexcept>
 #include <tuple>
 
 #include "host/report/gnuplot.hpp"
+#include "tests/benchmarks/program/program.hpp"
 
 namespace trocar::bench {
 namespace {
@@ -54,16 +53,6 @@ set ylabel 'force along x [N]'
 csv = folder.'/observer_trace.csv'
 plot csv skip 1 using 1:2 with steps lw 2 lc 'black' title 'hand', for [k in '2 3 1'] csv skip 1 using 1:(column(2+int(k))) with steps lc int(k) title word(methods, int(k))
 )";
-
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream file(part, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw std::runtime_error("cannot write " + part.string() + ": free some space or choose another folder with --out");
-  }
-  std::filesystem::rename(part, path);
-}
 
 const char* admitted(const Trial& row) { return row.method == "inverse" ? "" : control::to_text(row.admission.verdict); }
 

@@ -1,0 +1,1 @@
+trocar_library(tests/benchmarks/program SOURCES program.cpp PRIVATE_DEPENDS fmt::fmt)
