@@ -169,6 +169,7 @@ bool Flexible::converge(contact::WorkingSet& set, std::span<contact::Target> tar
   if (!linearise(needle::Tangent::Exact, set)) return false;
   double last_n = std::numeric_limits<double>::infinity();
   double nudge_rad = least_nudge_rad;
+  int full_steps = 0;
   for (int k = 0; k < max_iterations; ++k) {
     ++outcome.iterations;
     const int pivots = outcome.pivots;
@@ -176,10 +177,11 @@ bool Flexible::converge(contact::WorkingSet& set, std::span<contact::Target> tar
     bool solved = outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm;
     const bool slowly = !solved && k > 0 && pivots == outcome.pivots && outcome.residual_n * slow > last_n;
     // Newton's full step as long as it gains by its square or so.
-    while (slowly && !solved && k + 1 < max_iterations) {
+    while (slowly && !solved && k + 1 < max_iterations && full_steps < most_full_steps) {
       const double before_n = outcome.residual_n;
       ++k;
       ++outcome.iterations;
+      ++full_steps;
       if (!full_step(set, target)) return false;
       outcome.residual_n = residual_n(set, target);
       solved = outcome.residual_n <= tolerance_n && beam_.residual_nm() <= beam_tolerance_nm;
