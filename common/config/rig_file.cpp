@@ -229,6 +229,51 @@ void timing(const Table& table, Rig& rig) {
   }
 }
 
+rig::Planar planar(const Table& table, std::string_view key, const Range& range, std::string_view unit) {
+  const auto two = table.numbers<2>(key, range, fmt::format("[x and y, rotation], {}", unit));
+  return {two[0], two[1]};
+}
+
+rig::Coupling local_controller(const Table& table) {
+  return {planar(table, "damping", {0.0, 1e4}, "N s/m and N m s/rad, such as [35, 0.035]"),
+          planar(table, "stiffness", {0.0, 1e5}, "N/m and N m/rad, such as [100, 0.1]")};
+}
+
+// A rig without the table has no Haptic mode.
+void haptic(const Table& root, Rig& rig) {
+  if (!root.has("haptic")) return;
+  if (rig.kind == Kind::Single)
+    root.fail("haptic", "a single linkage has no handle that turns; remove the table, or write kind = \"twin\"");
+  const Table table = root.table("haptic");
+  rig::Haptic& h = rig.haptic;
+  constexpr Range mass{1e-6, 20.0}, damping{0.0, 1e4}, stiffness{0.0, 1e5};
+  h.present = true;
+  h.fade_s = table.number("fade_s", {0.0, 10.0}, "how long a change of mode, display or model fades, such as 0.5");
+  const Table observer = table.table("observer");
+  h.observer = observer.one_of("kind", {"nicosia", "momentum"}) == "nicosia" ? rig::ForceObserver::Nicosia : rig::ForceObserver::Momentum;
+  h.observer_bandwidth_rad_s = observer.number("bandwidth_rad_s", {1.0, 1e4}, "of the hand's force, such as 390");
+  h.observer_count_force_n = observer.number("count_force_n", {1e-6, 100.0}, "RMS that encoder counts alone may feign, such as 0.6");
+  const Table desired = table.table("desired");
+  h.desired_mass = planar(desired, "mass", mass, "kg and kg m^2, such as [0.3, 2.5e-4]");
+  h.desired_damping = planar(desired, "damping", damping, "N s/m and N m s/rad, 0 for none");
+  h.desired_stiffness = planar(desired, "stiffness", stiffness, "N/m and N m/rad about the homing pose, 0 for none");
+  const Table needle = table.table("needle");
+  h.needle_mass = planar(needle, "mass", mass, "kg and kg m^2, such as [0.3, 2.5e-4]");
+  h.needle_damping = planar(needle, "damping", damping, "N s/m and N m s/rad, 0 for none");
+  const Table four = table.table("four_channel");
+  h.master = local_controller(four.table("master"));
+  h.slave = local_controller(four.table("slave"));
+  h.adaptive_per_force_s_m = four.number("adaptive_per_force_s_m", damping, "K_b of the thesis, such as 60");
+  h.adaptive_per_moment_s_rad = four.number("adaptive_per_moment_s_rad", damping, "the same for the rotation, such as 1.9");
+  h.adaptive_least = planar(four, "adaptive_least", damping, "B_min, N s/m and N m s/rad, 0 for none");
+  h.tracking = local_controller(table.table("admittance").table("tracking"));
+  const Table guard = table.table("guard");
+  h.guard_credit_j = guard.number("credit_j", {0.0, 1.0}, "energy that the display may give without a force, such as 0.005");
+  h.guard_softest_n_m = guard.number("softest_n_m", {0.1, 1e5}, "softest spring that the tissue may store energy in, such as 50");
+  h.guard_bound_j = guard.number("bound_j", {1e-6, 1.0}, "energy given beyond that is a fault, such as 0.01");
+  h.guard_damping_n_s_m = guard.number("damping_n_s_m", damping, "most that the guard may add, such as 25");
+}
+
 rig::BusEndpoint endpoint(const Table& table) {
   rig::BusEndpoint end{};
   const bool udp = table.has("rig_port") || table.has("plant_port") || table.has("host");
@@ -336,6 +381,7 @@ Rig read_rig(const std::filesystem::path& file) {
   rig.sensor.counts_per_n = sensor.number("counts_per_n", {1e-3, 1e9}, "from the sensor's calibration sheet, such as 80");
   rig.sensor.counts_per_nm = sensor.number("counts_per_nm", {1e-3, 1e9}, "from the sensor's calibration sheet, such as 4000");
   rig.sensor.angle_rad = sensor.number("angle_rad", {-turn_rad, turn_rad}, "sensor x axis from the needle axis, counter-clockwise");
+  haptic(root, rig);
   buses(root.table("buses"), rig);
   homing(root.table("homing"), rig);
   document.refuse_unknown_keys();
@@ -355,6 +401,14 @@ Rig read_twin(const std::filesystem::path& file) {
 void refuse_bus(const std::filesystem::path& file, std::string_view bus, std::string_view port_key, std::string_view problem) {
   const Table table = Document::load(file).root().table("buses").table(bus);
   table.fail(table.has("interface") ? "interface" : port_key, problem);
+}
+
+void refuse_haptic(const std::filesystem::path& file, std::string_view problem) {
+  const Document document = Document::load(file);
+  const Table root = document.root();
+  if (!root.has("haptic"))
+    root.fail("haptic", "missing: this rig is no haptic device; take ubc_twin_haptic, or add the table as that rig's file has it");
+  root.table("haptic").table("observer").fail("bandwidth_rad_s", problem);
 }
 
 }  // namespace trocar::config

@@ -6,6 +6,10 @@
 //   [actuation], [limits], [timing], [force_sensor]: the members of the structs of the same name in common/rig/rig.hpp
 //   [homing] pose = [x_m, y_m, theta_rad]
 //   [[gains]] name, feed_forward, translation, rotation = { proportional, integral, derivative }; the first is the default
+//   [haptic] (or no Haptic mode; twin only) fade_s;  .observer kind = "nicosia" | "momentum", bandwidth_rad_s, count_force_n;
+//   .desired mass, damping, stiffness;  .needle mass, damping;  .four_channel adaptive_per_force_s_m, adaptive_per_moment_s_rad,
+//   adaptive_least, master, slave;  .admittance tracking;  .guard credit_j, softest_n_m, bound_j, damping_n_s_m; master, slave and
+//   tracking = { damping, stiffness }; masses, dampings, stiffnesses and adaptive_least are [x and y, rotation]
 //   [buses] bitrate_bps, drive_node, master_node, sensor_base_id;  [buses.drives], [buses.sensor]: interface, or rig_port and plant_port
 //   (and host)
 //
@@ -25,5 +29,7 @@ namespace trocar::config {
 [[nodiscard]] rig::Rig read_twin(const std::filesystem::path& file);
 // For a bus that the system would not open: names the line of its interface or, if it has none, of `port_key`.
 [[noreturn]] void refuse_bus(const std::filesystem::path& file, std::string_view bus, std::string_view port_key, std::string_view problem);
+// For a rig that cannot be the haptic device that it is asked to be: names the line of its observer's bandwidth, or that there is no table.
+[[noreturn]] void refuse_haptic(const std::filesystem::path& file, std::string_view problem);
 
 }  // namespace trocar::config

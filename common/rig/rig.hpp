@@ -88,6 +88,47 @@ struct ForceSensor {
   double angle_rad{};  // sensor x axis from the needle axis, counter-clockwise
 };
 
+// A value for x and y, and one for the rotation.
+struct Planar {
+  double translation{};
+  double rotation{};
+};
+
+// Local controller of a four-channel coupling, on velocity: damping + stiffness / s.
+struct Coupling {
+  Planar damping{};    // N s/m, N m s/rad
+  Planar stiffness{};  // N/m, N m/rad
+};
+
+enum class ForceObserver : std::uint8_t { Nicosia, Momentum };
+
+// The rig as a haptic device. What each number does is said where it is used: firmware/control.
+struct Haptic {
+  bool present{};  // false: this rig has no Haptic mode
+  double fade_s{};
+  // force observer
+  ForceObserver observer{};
+  double observer_bandwidth_rad_s{};
+  double observer_count_force_n{};  // RMS that encoder counts alone may feign
+  // impedance law
+  Planar desired_mass{};       // kg, kg m^2
+  Planar desired_damping{};    // N s/m, N m s/rad
+  Planar desired_stiffness{};  // N/m, N m/rad, about the homing pose
+  // displays
+  Planar needle_mass{};     // of the virtual needle's base: kg, kg m^2
+  Planar needle_damping{};  // N s/m, N m s/rad
+  Coupling master{}, slave{};
+  double adaptive_per_force_s_m{};
+  double adaptive_per_moment_s_rad{};
+  Planar adaptive_least{};  // N s/m, N m s/rad
+  Coupling tracking{};      // of the admittance display
+  // passivity guard
+  double guard_credit_j{};
+  double guard_softest_n_m{};
+  double guard_bound_j{};
+  double guard_damping_n_s_m{};
+};
+
 // Where one bus is found: a SocketCAN interface name, or a pair of UDP ports on a host (cannelloni datagrams).
 struct BusEndpoint {
   Name interface {};  // empty: UDP
@@ -116,6 +157,7 @@ struct Rig {
   Limits limits{};
   Timing timing{};
   ForceSensor sensor{};
+  Haptic haptic{};
   Buses buses{};
   std::uint32_t dds_domain{};
 

@@ -177,13 +177,13 @@ const char* to_text(Admissible verdict) noexcept {
     case Admissible::NotAPose:
       return "the mechanism cannot take every pose of its workspace";
     case Admissible::TooFastForTick:
-      return "bandwidth too high for the tick";
+      return "too high for the tick; lower it";
     case Admissible::TooSlowForSpeed:
-      return "bandwidth too low for the speed";
+      return "too low for the speeds that the limits allow; raise it, or take kind = \"momentum\"";
     case Admissible::FrictionTooSteep:
-      return "friction too steep for the bandwidth: smooth it more";
+      return "too low for the joints' friction; raise it, or take kind = \"momentum\"";
     case Admissible::EncoderTooCoarse:
-      return "bandwidth too high for the encoder";
+      return "too high for the encoder; lower it, or allow more in count_force_n";
   }
   return "";
 }

@@ -34,7 +34,7 @@
 
 namespace trocar::control {
 
-enum class ObserverKind : std::uint8_t { Nicosia, Momentum };
+using ObserverKind = rig::ForceObserver;
 
 struct ForceObserverConfig {
   ObserverKind kind{};
@@ -48,6 +48,10 @@ struct ForceObserverConfig {
 // least_smoothing_rad_s. Twin rigs only.
 inline constexpr double least_smoothing_rad_s = 0.1;  // 1 cm/s of a handle 0.1 m from the motors
 [[nodiscard]] ForceObserverConfig force_observer_config(const rig::Rig& rig, ObserverKind kind, double bandwidth_rad_s) noexcept;
+// As the rig file asks for it.
+[[nodiscard]] inline ForceObserverConfig force_observer_config(const rig::Rig& rig) noexcept {
+  return force_observer_config(rig, rig.haptic.observer, rig.haptic.observer_bandwidth_rad_s);
+}
 
 struct ForceEstimate {
   mechanism::Vec3 wrench = mechanism::Vec3::Zero();           // N, N, N m of the hand on the mechanism
@@ -97,5 +101,8 @@ struct Admission {
 
 // At start, milliseconds: over poses of the rig's workspace limits and speeds up to its velocity faults, with its encoder and tick.
 [[nodiscard]] Admission admit(const ForceObserverConfig& config, const rig::Rig& rig, double count_force_allowed_n) noexcept;
+[[nodiscard]] inline Admission admit(const rig::Rig& rig) noexcept {
+  return admit(force_observer_config(rig), rig, rig.haptic.observer_count_force_n);
+}
 
 }  // namespace trocar::control

@@ -4,6 +4,34 @@ namespace trocar::control {
 
 using mechanism::Vec3;
 
+namespace {
+
+Vec3 vector(const rig::Planar& p) noexcept { return {p.translation, p.translation, p.rotation}; }
+LocalController local(const rig::Coupling& c) noexcept { return {vector(c.damping), vector(c.stiffness)}; }
+
+}  // namespace
+
+HapticConfig haptic_config(const rig::Rig& rig) noexcept {
+  const rig::Haptic& h = rig.haptic;
+  HapticConfig config;
+  const VirtualSlave needle{vector(h.needle_mass), vector(h.needle_damping)};
+  config.display.four_channel = {
+      local(h.master), local(h.slave), {h.adaptive_per_force_s_m, h.adaptive_per_moment_s_rad, vector(h.adaptive_least)}, needle};
+  config.display.admittance = {needle, local(h.tracking)};
+  config.display.glide.duration_s = config.fade.duration_s = h.fade_s;
+  config.guard.credit_j = config.guard.initial_j = h.guard_credit_j;
+  config.guard.softest_n_m = h.guard_softest_n_m;
+  config.guard.bound_j = h.guard_bound_j;
+  config.guard.damping_n_s_m = h.guard_damping_n_s_m;
+  config.impedance = {false,
+                      vector(h.desired_mass),
+                      vector(h.desired_damping),
+                      vector(h.desired_stiffness),
+                      {rig.homing_pose[0], rig.homing_pose[1], rig.homing_pose[2]}};
+  config.limits = output_limits(rig.limits);
+  return config;
+}
+
 void enter(HapticState& state, Display display, const DeviceState& device, const Vec3& u) noexcept {
   state = {};
   enter(state.display, display, device.pose, device.velocity);

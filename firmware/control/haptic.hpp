@@ -19,6 +19,9 @@ struct HapticConfig {
   OutputLimits limits{};
 };
 
+// As the rig file asks for it.
+[[nodiscard]] HapticConfig haptic_config(const rig::Rig& rig) noexcept;
+
 struct HapticState {
   DisplayState display{};
   FadeState fade{};

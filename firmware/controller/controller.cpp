@@ -25,15 +25,8 @@ constexpr double velocity_bandwidth_rad_s = 300.0;            // one count of 40
 constexpr double load_bandwidth_rad_s = 60.0;
 constexpr double longest_step_s = 0.005;           // after a stall the reference goes on slowly instead of jumping
 constexpr double jump_factor = 4.0;                // motion per tick beyond this many times the velocity fault is no motion
-constexpr double hand_bandwidth_rad_s = 390.0;     // of the force observer: tests/benchmarks/observer
 constexpr std::uint32_t most_unsolved_ticks = 20;  // of the virtual needle in a row, then its wrench is too old to be felt
 constexpr double friction_smoothing_rad_s = 0.01;  // joint speed at which the fed-forward Coulomb friction is at 76 %
-
-control::HapticConfig haptic_config(const rig::Rig& rig) noexcept {
-  control::HapticConfig config;
-  config.limits = control::output_limits(rig.limits);
-  return config;
-}
 
 }  // namespace
 
@@ -41,9 +34,9 @@ Controller::Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time, vir
     : rig_(rig),
       mail_(mail),
       late_limit_ns_(1000 * static_cast<std::int64_t>(real_time ? rig.timing.late_tick_us : rig.timing.late_tick_best_effort_us)),
-      needle_(needle),
-      hand_config_(control::force_observer_config(rig, control::ObserverKind::Nicosia, hand_bandwidth_rad_s)),
-      haptic_config_(haptic_config(rig)),
+      needle_(rig.haptic.present ? needle : nullptr),
+      hand_config_(control::force_observer_config(rig)),
+      haptic_config_(control::haptic_config(rig)),
       host_(static_cast<std::int64_t>(rig.timing.host_timeout_ms) * ns_per_ms),
       enabling_(enable_timeout_ns) {}
 

@@ -54,7 +54,8 @@ struct Status {
 class Controller {
  public:
   // real_time: the machine granted the whole real-time set-up; selects the lateness limit.
-  // needle: what Haptic shows; without one that mode is refused.
+  // needle: what Haptic shows; without one, or on a rig that is no haptic device, that mode is refused. Whether the rig's observer is
+  // admissible (control::admit) the caller has to ask.
   // Preconditions: rig is a twin, read and checked by common/config; rig, mail and needle outlive the controller.
   Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time, virtual_needle::VirtualNeedle* needle = nullptr) noexcept;
 

@@ -4,7 +4,9 @@ namespace trocar::virtual_needle {
 
 using mechanism::Vec3;
 
-VirtualNeedle::VirtualNeedle() : model_(std::make_unique<insertion::Insertion>()) { fade_.time_s = fade_config_.duration_s; }
+VirtualNeedle::VirtualNeedle(const control::FadeConfig& fade) : model_(std::make_unique<insertion::Insertion>()), fade_config_(fade) {
+  fade_.time_s = fade_config_.duration_s;
+}
 
 void VirtualNeedle::take() noexcept {
   const model::Image* const offered = offered_.load(std::memory_order_acquire);

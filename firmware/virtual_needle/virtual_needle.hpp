@@ -14,7 +14,7 @@ namespace trocar::virtual_needle {
 
 class VirtualNeedle {
  public:
-  VirtualNeedle();  // allocates; nothing else does
+  explicit VirtualNeedle(const control::FadeConfig& fade = {});  // allocates; nothing else does
 
   // Any thread, one at a time. The image must outlive its use: until the next offer has been taken (`using_image`).
   void offer(const model::Image* image) noexcept { offered_.store(image, std::memory_order_release); }

@@ -105,8 +105,11 @@ int run(const Options& options) {
   open(p.sensor, p.rig.buses.sensor, "sensor");
 
   std::optional<image_file::MappedImage> model;
-  virtual_needle::VirtualNeedle needle;
+  virtual_needle::VirtualNeedle needle({p.rig.haptic.fade_s});
   if (!options.model.empty()) {
+    const control::Admission admission = p.rig.haptic.present ? control::admit(p.rig) : control::Admission{};
+    if (!p.rig.haptic.present || admission.verdict != control::Admissible::Yes)
+      config::refuse_haptic(path, control::to_text(admission.verdict));
     model.emplace(options.model, image_file::Lock::Yes);
     needle.offer(&model->image());
   }

@@ -140,6 +140,29 @@ TEST_F(RigFileTest, ReadsASingleLinkageWithTwoDrivesAndNoCoupling) {
   EXPECT_EQ(rig.actuation.gear_ratio[2], 0.0);
 }
 
+TEST_F(RigFileTest, ReadsTheHapticTableOfARigThatHasOne) {
+  EXPECT_FALSE(read_rig(write(twin_rig)).haptic.present);
+  const rig::Haptic h = read_rig(TROCAR_SHARE "/rigs/ubc_twin_haptic.toml").haptic;
+  EXPECT_TRUE(h.present);
+  EXPECT_EQ(h.observer, rig::ForceObserver::Nicosia);
+  EXPECT_EQ(h.observer_bandwidth_rad_s, 390.0);
+  EXPECT_EQ(h.observer_count_force_n, 0.6);
+  EXPECT_EQ(h.desired_mass.rotation, 2.5e-4);
+  EXPECT_EQ(h.master.damping.translation, 35.0);
+  EXPECT_EQ(h.slave.stiffness.rotation, 0.1);
+  EXPECT_EQ(h.tracking.stiffness.translation, 400.0);
+  EXPECT_EQ(h.guard_bound_j, 0.01);
+  expect_parts(error_of(std::string(twin_rig) + "[haptic]\nfade_s = -1.0\n", read_rig), {"haptic.fade_s = -1: must be from 0 to 10"});
+  expect_parts(error_of(std::string(twin_rig) + "[haptic]\nfade_s = 0.5\n[haptic.observer]\nkind = \"kalman\"\n", read_rig),
+               {"haptic.observer.kind = \"kalman\": not known here", "\"nicosia\", \"momentum\""});
+}
+
+TEST_F(RigFileTest, RefusesARigThatIsNoHapticDevice) {
+  expect_parts(error_from([&] { refuse_haptic(write(twin_rig), ""); }), {"file.toml", "haptic: missing: this rig is no haptic device"});
+  expect_parts(error_from([&] { refuse_haptic(TROCAR_SHARE "/rigs/ubc_twin_haptic.toml", "too high; lower it"); }),
+               {"ubc_twin_haptic.toml:", "haptic.observer.bandwidth_rad_s = 390: too high; lower it"});
+}
+
 TEST_F(RigFileTest, RefusesBadInputOfEveryClass) {
   refused("base_m = 0.08", "base_m = -0.08", {"linkage.base_m = -0.08: must be from 0 to 2; the distance between the motor axes"});
   refused("base_m = 0.08", "base_m = \"wide\"", {"linkage.base_m = \"wide\": expected a number, got a text"});
