@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "firmware/control/hysteresis.hpp"
+
 namespace trocar::control {
 
 using mechanism::Mat2;
@@ -140,6 +142,7 @@ ForceObserverConfig force_observer_config(const rig::Rig& rig, ObserverKind kind
   const double count_rad = 2.0 * std::numbers::pi / rig.actuation.encoder_counts_per_turn;
   config.friction.fill({rig.actuation.friction_coulomb_nm, rig.actuation.friction_viscous_nm_s,
                         std::max(least_smoothing_rad_s, bandwidth_rad_s * count_rad)});
+  config.play_rad = 1.001 * count_rad;
   config.model = rig.twin;
   const double share = rig.twin.handle_com_m / rig.twin.coupling_m;
   config.model.linkage[0].end_point_mass_kg += (1.0 - share) * rig.twin.handle_mass_kg;
@@ -158,7 +161,10 @@ Status update(const ForceObserverConfig& config, ForceObserverState& state, cons
   Status status = Status::NotFinite;
   if (angle_rad.allFinite() && torque_nm.allFinite()) {
     ForceObserverState next = state;
-    status = take(config, next, angle_rad, torque_nm, step_s);
+    Vec4 angle = angle_rad;
+    if (state.started)
+      for (Eigen::Index i = 0; i < 4; ++i) angle[i] = hysteresis(state.angle[i], angle_rad[i], config.play_rad);
+    status = take(config, next, angle, torque_nm, step_s);
     if (status == Status::Ok) {
       state = next;
       return status;

@@ -42,10 +42,14 @@ struct ForceObserverConfig {
   std::array<JointFriction, 4> friction{};
   mechanism::TwinModel model{};  // end points carry their share of the handle, whose own mass is not read
   double spare_inertia_kg_m2{};  // S
+  // Play that takes the chatter of one count out of every angle (hysteresis.hpp); 0 takes them as they are. The observer multiplies a count
+  // by M w^2: at rest on the edge between two counts that alone, fed back by a display, is a limit cycle. In motion the angle is half a
+  // count late, which no force and no velocity shows.
+  double play_rad{};
 };
 
 // Friction from the rig file, smoothed over what one count feigns at this bandwidth (bandwidth * count) and at least
-// least_smoothing_rad_s. Twin rigs only.
+// least_smoothing_rad_s. Play of one count and a little. Twin rigs only.
 inline constexpr double least_smoothing_rad_s = 0.1;  // 1 cm/s of a handle 0.1 m from the motors
 [[nodiscard]] ForceObserverConfig force_observer_config(const rig::Rig& rig, ObserverKind kind, double bandwidth_rad_s) noexcept;
 // As the rig file asks for it.
@@ -63,7 +67,7 @@ struct ForceEstimate {
 struct ForceObserverState {
   bool started{};
   double gap_s{};  // since the last sample that was taken
-  mechanism::Vec4 angle = mechanism::Vec4::Zero();
+  mechanism::Vec4 angle = mechanism::Vec4::Zero();  // behind the play
   std::array<DisturbanceState, 4> joint{};  // Nicosia
   struct {                                  // Momentum, in the middle of the last step
     bool known{};

@@ -1,7 +1,7 @@
-// Takes the chatter of one count out of a position before its velocity is formed: the output stays
-// while the input is within half a step of it, as play of one step does. At rest on the edge between two counts the velocity is then zero,
-// where each flip would otherwise disturb it by bandwidth / e counts: that times any damping is a limit cycle by itself. For the velocity
-// only. A spring that saw the play would lag by it, and a lagging spring feeds energy in.
+// Takes the chatter of one count out of a position before velocities and accelerations are formed: the output stays while the input is
+// within half a step of it, as play of one step does. At rest on the edge between two counts the velocity is then zero, where each flip
+// would otherwise disturb it by bandwidth / e counts: that times any damping is a limit cycle by itself. Not for a spring: one that saw
+// the play would lag by it, and a lagging spring feeds energy in.
 #pragma once
 
 #include <algorithm>
