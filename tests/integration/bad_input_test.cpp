@@ -120,6 +120,18 @@ TEST(BadInput, SingleLinkageCannotCarryTheHandle) {
   EXPECT_TRUE(untouched(out));
 }
 
+// Before the bus is opened and a model is looked for.
+TEST(BadInput, ARigThatCannotBeAHapticDeviceTakesNoModel) {
+  const Scratch scratch;
+  const auto rig = scratch.make_rig();
+  const Words start{"--rig", rig.string(), "--domain", domain(), "--best-effort", "--model", (scratch / "none.image").string()};
+  expect_refusal(scratch, "trocar-rig", start, {rig.string(), "haptic", "no haptic device", "take ubc_twin_haptic"});
+  write_text(rig, shared_file("rigs/ubc_twin_haptic.toml", {{"encoder_counts_per_turn = 16000", "encoder_counts_per_turn = 2000"}}));
+  expect_refusal(
+      scratch, "trocar-rig", start,
+      {line_of(rig, "bandwidth_rad_s = 390.0"), "haptic.observer.bandwidth_rad_s = 390", "too high for the encoder", "lower it"});
+}
+
 TEST(BadInput, TakenPortIsNamed) {
   const Scratch scratch;
   const auto ports = free_udp_ports(2);

@@ -97,6 +97,10 @@ int run(const Options& options) {
   auto process = std::make_unique<Process>(config::read_twin(path));
   Process& p = *process;
   if (options.domain >= 0) p.rig.dds_domain = static_cast<std::uint32_t>(options.domain);
+  if (!options.model.empty()) {
+    const control::Admissible verdict = p.rig.haptic.present ? control::admit(p.rig).verdict : control::Admissible::NotPositive;
+    if (verdict != control::Admissible::Yes) config::refuse_haptic(path, control::to_text(verdict));
+  }
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
     const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig);
     if (status.error_number != 0) config::refuse_bus(path, name, "rig_port", status.message.data());
@@ -107,9 +111,6 @@ int run(const Options& options) {
   std::optional<image_file::MappedImage> model;
   virtual_needle::VirtualNeedle needle({p.rig.haptic.fade_s});
   if (!options.model.empty()) {
-    const control::Admission admission = p.rig.haptic.present ? control::admit(p.rig) : control::Admission{};
-    if (!p.rig.haptic.present || admission.verdict != control::Admissible::Yes)
-      config::refuse_haptic(path, control::to_text(admission.verdict));
     model.emplace(options.model, image_file::Lock::Yes);
     needle.offer(&model->image());
   }
