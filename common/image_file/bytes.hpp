@@ -30,8 +30,9 @@ class AlignedBytes {
 
 enum class Lock { No, Yes };
 
-// A whole file, mapped for reading. Writers replace files by renaming, so a mapped one does not change. Lock::Yes keeps it in memory, so
-// that no read of it waits for a disk. Throws config::UserError naming the file and the reason.
+// A whole file for reading. Lock::No maps it: writers replace files by renaming, so a mapped one does not change. Lock::Yes makes a copy
+// that stays in memory, so that no read of it waits for a disk and whatever happens to the file is no matter. Throws config::UserError
+// naming the file and the reason.
 class MappedFile {
  public:
   MappedFile(const std::filesystem::path& file, Lock lock);

@@ -15,9 +15,9 @@
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
-#include "common/image_file/mapped_image.hpp"
 #include "firmware/bridge/bridge.hpp"
 #include "firmware/controller/controller.hpp"
+#include "firmware/model_watch/model_watch.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
 #include "hal/realtime/setup.hpp"
@@ -108,12 +108,10 @@ int run(const Options& options) {
   open(p.drives, p.rig.buses.drives, "drives");
   open(p.sensor, p.rig.buses.sensor, "sensor");
 
-  std::optional<image_file::MappedImage> model;
   virtual_needle::VirtualNeedle needle({p.rig.haptic.fade_s});
-  if (!options.model.empty()) {
-    model.emplace(options.model, image_file::Lock::Yes);
-    needle.offer(&model->image());
-  }
+  std::optional<model_watch::ModelWatch> model;
+  if (!options.model.empty())
+    model.emplace(options.model, needle, [](const std::string& line) { fmt::print(stderr, "trocar-rig: {}\n", line); });
 
   bridge::Bridge bridge(p.rig, p.mail, p.shared);
   rt::Setup setup;
@@ -149,7 +147,8 @@ int main(int argc, char** argv) {
   bool die_with_parent = false;
   CLI::App app{"trocar-rig: the real-time controller of a rig.\nExample: trocar-rig --rig ubc_twin --best-effort"};
   app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
-  app.add_option("--model", options.model, "model image for Haptic mode, from trocar scene compile");
+  app.add_option("--model", options.model,
+                 "model image for Haptic mode, from trocar scene compile; one that replaces it is taken while the rig runs");
   app.add_option("--domain", options.domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
   app.add_option("--cpu", options.cpu, "core to run on")->check(CLI::NonNegativeNumber);
   app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();

@@ -78,6 +78,17 @@ TEST_F(Files, MapsAnImage) {
   }
 }
 
+TEST_F(Files, ALockedImageOutlivesWhatIsDoneToItsFile) {
+  model::testing::TinyImage tiny;
+  const auto bytes = tiny.bytes();
+  const auto path = put(bytes.span());
+  const MappedImage locked(path, Lock::Yes);
+  std::filesystem::resize_file(path, 0);
+  put({bytes.span().first(100)});
+  EXPECT_TRUE(std::ranges::equal(locked.bytes(), bytes.span()));
+  EXPECT_EQ(locked.image().law->shaft_n_per_m, 34.0);
+}
+
 TEST_F(Files, MappedImageMoves) {
   model::testing::TinyImage tiny;
   MappedImage first(put(tiny.bytes().span(), "first"));
