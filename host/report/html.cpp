@@ -120,6 +120,30 @@ std::string insertions_table(const RunInfo& run, const Summary& summary) {
       rows);
 }
 
+std::string displays_table(const RunInfo& run, const Summary& summary) {
+  std::string rows;
+  const bool known = !run.truth.empty();
+  for (const HapticDisplay& d : summary.displays) {
+    const auto energy = [](double j) { return number(1e3 * j, 2, "mJ"); };
+    rows += fmt::format("<tr><td>{}</td>", escaped(d.name));
+    for (const std::string& cell :
+         {fmt::format("{:.1f}&nbsp;s", d.duration_s), millimetres(d.depth_m, 1), newtons(d.force_n), number(d.difference.rms_n, 3, "N"),
+          number(d.at_rest.rms_n, 3, "N"), energy(d.least_energy_j), fmt::format("{} of {}", d.unsolved_ticks, d.ticks),
+          fmt::format("{}", d.most_contacts)})
+      rows += "<td>" + cell + "</td>";
+    if (known)
+      rows += fmt::format("<td>{}{}</td>", number(d.observer.rms_n, 3, "N"),
+                          std::isfinite(d.observer_rise_s) ? ", rise " + number(1e3 * d.observer_rise_s, 0, "ms") : std::string());
+    rows += "</tr>\n";
+  }
+  std::string heads;
+  for (const char* head : {"Display", "Time", "Greatest depth", "Greatest model force", "Hand less model, rms", "The same at rest",
+                           "Least energy", "Ticks unsolved", "Contacts, most"})
+    heads += fmt::format("<th>{}</th>", head);
+  if (known) heads += "<th>Estimate less true hand, rms</th>";
+  return "<div class=\"wide\"><table>\n<thead><tr>" + heads + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+}
+
 std::string tracking_table(const Summary& summary) {
   std::string rows;
   for (const GainTracking& t : summary.tracking) {
@@ -194,11 +218,13 @@ figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; } figcaption 
 )";
 
 std::string page(const RunInfo& run, const Summary& summary, const std::vector<Figure>& figures, const fs::path& drawn) {
+  const bool haptic = run.kind == RunInfo::Kind::Haptic;
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n"
-      "<title>Needle insertion: {0}, {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<h1>Needle insertion</h1>\n"
+      "<title>{5}: {0}, {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<h1>{5}</h1>\n"
       "<p class=\"sub\">Rig {0}, scene {1}, gains {3}, {4}.</p>\n",
-      escaped(run.rig), escaped(run.scene), style, escaped(run.gains), run.lockstep ? "in lock-step on a virtual clock" : "in real time");
+      escaped(run.rig), escaped(run.scene), style, escaped(run.gains), run.lockstep ? "in lock-step on a virtual clock" : "in real time",
+      haptic ? "A virtual needle in the hand" : "Needle insertion");
   const auto figure = [&](const char* file) {
     for (const Figure& f : figures) {
       if (f.file != file) continue;
@@ -206,13 +232,18 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
                          inlined(drawn / f.file, fs::path(f.file).stem().string()), f.title, f.caption);
     }
   };
-  figure("force_depth.svg");
-  out += "<h2>Beside the thesis</h2>\n" + beside_thesis(run, summary);
-  out += "<h2>Insertions</h2>\n" + insertions_table(run, summary);
-  out += "<h2>Tracking</h2>\n" + tracking_table(summary);
-  figure("tracking.svg");
-  out += "<h2>Course of the run</h2>\n";
-  figure("overview.svg");
+  if (haptic) {
+    out += "<h2>Displays</h2>\n" + displays_table(run, summary);
+    for (const char* file : {"felt_time.svg", "felt_depth.svg", "display_energy.svg"}) figure(file);
+  } else {
+    figure("force_depth.svg");
+    out += "<h2>Beside the thesis</h2>\n" + beside_thesis(run, summary);
+    out += "<h2>Insertions</h2>\n" + insertions_table(run, summary);
+    out += "<h2>Tracking</h2>\n" + tracking_table(summary);
+    figure("tracking.svg");
+    out += "<h2>Course of the run</h2>\n";
+    figure("overview.svg");
+  }
   out += "<h2>Timing</h2>\n" + timing_table(run, summary);
   figure("tick_time.svg");
   figure("wakeup.svg");

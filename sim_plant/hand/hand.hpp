@@ -6,13 +6,13 @@
 // 21, 2005: the hand at a telemanipulator; Hogan 1989: arm impedance). The want is a minimum-jerk way between points (Flash and Hogan
 // 1985). Tremor: noise through a resonance at 8 to 12 Hz, so many newtons (N m) RMS on the arm. No more force than `largest` leaves the
 // grip: beyond, it slips. Or a recording: the handle's wrench over time, whatever the handle does. Integrated by the implicit midpoint rule
-// with the handle's motion given: it adds no energy, however stiff the grip.
+// with the handle's motion given: it adds no energy, however stiff the grip. With a habit it takes the handle and lets it go by itself.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "sim_plant/plant/random.hpp"
@@ -49,12 +49,24 @@ struct RecordedWrench {
   std::array<double, 3> wrench{};
 };
 
+// What a person does of his own accord: takes the handle so long after the motors came on, goes his way with it, or repeats what was
+// recorded, and lets go when they go off.
+struct Habit {
+  double take_after_s{};
+  // From where the handle was taken: along the needle, across it (to its left), angle; time from then on, the first at 0.
+  std::vector<Intention> way{};
+  double period_s{};                        // the way begins anew at these intervals, at least its length; 0: once
+  std::vector<RecordedWrench> recording{};  // instead of the way, in the rig's frame, when it is not empty
+};
+
 class Hand {
  public:
   using Vector3 = std::array<double, 3>;
 
   // At rest, holding the handle at that pose and wanting to stay there.
   Hand(const HandConfig& config, const Vector3& pose);
+  // Away from the handle, until the motors come on.
+  Hand(const HandConfig& config, Habit habit);
 
   // Times increase; between two points minimum jerk, before the first and after the last one rest. Replaces what it wanted.
   void want(std::vector<Intention> way);
@@ -62,11 +74,14 @@ class Hand {
   void replay(std::vector<RecordedWrench> recording);
   void let_go() noexcept { holds_ = false; }
   void hold(const Vector3& pose) noexcept;  // where the handle is
+  // Before every step: whether the motors are on, and where the handle is. Without a habit this is nothing to it.
+  void notice(bool motors_on, double time_s, const Vector3& pose) noexcept;
 
   // Wrench on the handle at the end of a step in which the handle went to this pose with this velocity. dt_s > 0.
   const Vector3& advance(double time_s, const Vector3& pose, const Vector3& velocity, double dt_s) noexcept;
 
   [[nodiscard]] const Vector3& wrench() const noexcept { return wrench_; }
+  [[nodiscard]] bool holds() const noexcept { return holds_; }
   [[nodiscard]] const Vector3& arm() const noexcept { return y_; }
   [[nodiscard]] Vector3 wanted(double time_s) const noexcept;
 
@@ -80,6 +95,11 @@ class Hand {
   HandConfig config_;
   std::vector<Intention> way_{};
   std::vector<RecordedWrench> recording_{};
+  std::optional<Habit> habit_{};
+  double on_since_s_{};
+  bool on_{false};
+  double begin_s_{};   // of way and recording
+  double period_s_{};  // of the way, 0: none
   Random random_;
   bool holds_{true};
   Vector3 y_{}, velocity_{};
