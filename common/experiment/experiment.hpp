@@ -1,7 +1,7 @@
 // An experiment as plain data, and the steps that carry it out. The sequencer is a state machine without clock, bus or network: samples and
 // replies in, commands out. The host runs it over DDS, the lock-step bench in the controller's own process.
-// Two kinds: the rig inserts a needle, or a hand feels a virtual one, shown by one display after the other. Who holds the handle is nothing to
-// the sequencer: a person, or the simulated one of a hand file, who knows nothing of the sequencer either.
+// Two kinds: the rig inserts a needle, or a hand feels a virtual one, shown by one display after the other. Who holds the handle is nothing
+// to the sequencer: a person, or the simulated one of a hand file, who knows nothing of the sequencer either.
 #pragma once
 
 #include <array>

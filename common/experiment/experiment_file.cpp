@@ -22,8 +22,8 @@ std::string quoted(const std::string& text) {
   return out + '"';
 }
 
-constexpr std::array insertion_keys{"speeds_m_s",       "depth_m",         "standoff_m",    "lane_spacing_m",     "approach_speed_m_s",
-                                    "touch_speed_m_s",  "touch_force_n",   "withdraw_speed_m_s", "dwell_s",      "thesis_check",
+constexpr std::array insertion_keys{"speeds_m_s",      "depth_m",       "standoff_m",         "lane_spacing_m", "approach_speed_m_s",
+                                    "touch_speed_m_s", "touch_force_n", "withdraw_speed_m_s", "dwell_s",        "thesis_check",
                                     "thesis_speed_m_s"};
 constexpr std::array haptic_keys{"hand", "displays", "display_s", "take_s"};
 
@@ -52,7 +52,8 @@ InsertionCourse read_insertion(const config::Table& t) {
 
 HapticCourse read_haptic(const config::Table& t) {
   HapticCourse e;
-  const auto displays = t.texts("displays", {to_string(Display::FourChannel), to_string(Display::Impedance), to_string(Display::Admittance)});
+  const auto displays =
+      t.texts("displays", {to_string(Display::FourChannel), to_string(Display::Impedance), to_string(Display::Admittance)});
   for (const std::string& name : displays) e.displays.push_back(*display_of(name));
   e.display_s = t.number("display_s", {0.1, 3600.0}, "time that a person has with each display, such as 30");
   e.take_s = t.number("take_s", {0.1, 600.0}, "time to take the handle after the motors came on, such as 5");
@@ -86,7 +87,8 @@ void replace(Experiment& e, const std::vector<double>& speeds_m_s, const std::st
   if (!speeds_m_s.empty() && e.haptic())
     throw config::UserError(fmt::format("--speeds: the experiment {} is haptic and has no insertion speeds; leave it out", e.name));
   if (!hand.empty() && !e.haptic())
-    throw config::UserError(fmt::format("--hand: nobody holds the handle in the experiment {}; leave it out, or take a haptic one", e.name));
+    throw config::UserError(
+        fmt::format("--hand: nobody holds the handle in the experiment {}; leave it out, or take a haptic one", e.name));
   if (!speeds_m_s.empty()) std::get<InsertionCourse>(e.course).speeds_m_s = speeds_m_s;
   if (!hand.empty()) e.hand = hand;
 }
@@ -141,7 +143,10 @@ Run read_run(const std::filesystem::path& folder) {
     const std::string kind = p.text("kind", remedy);
     const auto known = phase_kind(kind);
     if (!known) p.fail("kind", std::string("no such phase; ") + remedy);
-    run.phases.push_back({p.text("name", remedy), *known, p.number("speed_m_s", any, remedy), p.text("gain_set", remedy),
+    run.phases.push_back({p.text("name", remedy),
+                          *known,
+                          p.number("speed_m_s", any, remedy),
+                          p.text("gain_set", remedy),
                           static_cast<std::uint64_t>(p.integer("first_tick", 0, INT64_MAX, remedy)),
                           static_cast<std::uint64_t>(p.integer("last_tick", 0, INT64_MAX, remedy)),
                           {}});

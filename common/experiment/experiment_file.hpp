@@ -15,8 +15,8 @@
 namespace trocar::experiment {
 
 [[nodiscard]] Experiment read_experiment(const std::filesystem::path& file);
-// What a command line says instead of the file, unless empty: insertion speeds, the hand. Throws config::UserError when the experiment is not
-// of the kind that has them.
+// What a command line says instead of the file, unless empty: insertion speeds, the hand. Throws config::UserError when the experiment is
+// not of the kind that has them.
 void replace(Experiment& experiment, const std::vector<double>& speeds_m_s, const std::string& hand);
 
 struct Run {

@@ -219,9 +219,13 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
 
 void print_summary(const report::Summary& s) {
   for (const auto& d : s.displays) {
-    fmt::print("{:<12} depth {:5.1f} mm, force {:6.3f} N, handle less model {:.3f} N RMS, least energy {:+.4f} J, {} of {} ticks unsolved\n",
-               d.name, 1e3 * d.depth_m, d.force_n, d.difference.rms_n, d.least_energy_j, d.unsolved_ticks, d.ticks);
-    if (d.observer.ticks > 0) fmt::print("{:<12} estimated less true hand force {:.3f} N RMS\n", "", d.observer.rms_n);
+    if (d.ticks == 0) {
+      fmt::print("{:<12} was not felt\n", d.name);
+      continue;
+    }
+    fmt::print("{:<12} depth {:5.1f} mm, force {:6.3f} N, hand less model {:.3f} N RMS, least energy {:+.1f} mJ, {} of {} ticks unsolved\n",
+               d.name, 1e3 * d.depth_m, d.force_n, d.difference.rms_n, 1e3 * d.least_energy_j, d.unsolved_ticks, d.ticks);
+    if (d.observer.ticks > 0) fmt::print("{:<12} estimate less true hand {:.3f} N RMS\n", "", d.observer.rms_n);
   }
   for (const auto& i : s.insertions)
     fmt::print("{:<34} force at depth {:6.3f} N, slope {:5.1f} N/m, tracking RMS {:.3f} mm\n", i.name, i.full_depth_force_n,

@@ -232,7 +232,7 @@ std::string slice_means(const std::string& block, const Felt& felt, Value&& valu
 std::string felt_time_script(const RunInfo& run, const std::vector<Felt>& displays) {
   if (displays.empty()) return {};
   const auto n = static_cast<double>(displays.size());
-  const double top = 46.0, row = 210.0, bottom = 60.0, gap = 34.0;
+  const double top = 46.0, row = 210.0, bottom = 40.0, gap = 44.0;
   const double height = top + n * row + bottom;
   std::string blocks, panels;
   for (std::size_t i = 0; i < displays.size(); ++i) {
@@ -255,15 +255,15 @@ std::string felt_time_script(const RunInfo& run, const std::vector<Felt>& displa
         upper, lower, felt.name, dark, seconds(felt.samples.front()), seconds(felt.samples.back()),
         i == 0 ? "set key at screen 0.535,0.985 center top horizontal Left reverse samplen 2 width -1\n" : "set nokey\n",
         i + 1 == displays.size() ? "set xlabel 'time since the controller started [s]'\n" : "");
-    if (known) panels += fmt::format("$true{} using 1:2 with lines lw 3 lc rgb '#BBBBBB' title 'hand, true', ", i);
-    panels += fmt::format(
-        "$handle{0} using 1:2 with lines lw 1.5 lc rgb '{1}' title 'hand, estimated', "
-        "$model{0} using 1:2 with lines lw 1.5 lc rgb '{2}' title 'model'\n",
-        i, palette[0], palette[3]);
+    panels += fmt::format("$handle{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'hand, estimated', ", i, palette[5]);
+    if (known) panels += fmt::format("$true{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'hand, true', ", i, dark);
+    panels += fmt::format("$model{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'model'\n", i, palette[3]);
   }
   return head("felt_time", 900, static_cast<int>(height)) + blocks +
-         fmt::format("set multiplot\nset lmargin at screen 0.08\nset rmargin at screen 0.98\nset xzeroaxis lc rgb '{}' lt 1 lw 1\n{}unset multiplot\n",
-                     dark, panels);
+         fmt::format(
+             "set multiplot\nset lmargin at screen 0.08\nset rmargin at screen 0.98\nset xzeroaxis lc rgb '{}' lt 1 lw 1\n{}unset "
+             "multiplot\n",
+             dark, panels);
 }
 
 // Panels side by side, three in a row, on the same scales.
@@ -297,16 +297,18 @@ std::string felt_depth_script(const RunInfo& run, const std::vector<Felt>& displ
     panels += fmt::format(
         "set title '{1}'\n{2}plot $depth{0} using 1:2 with lines lw 1.5 lc rgb '{3}' title 'hand, estimated', "
         "$depth{0} using 1:3 with lines lw 1.5 lc rgb '{4}' title 'model'\n",
-        i, displays[i].name, i % columns == 0 ? "set ylabel 'force along the needle [N]'\n" : "unset ylabel\n", palette[0], palette[3]);
+        i, displays[i].name, i % columns == 0 ? "set ylabel 'force along the needle [N]'\n" : "unset ylabel\n", palette[5], palette[3]);
   }
   const double margin = 0.05 * (most - least) + 1e-3;
-  return head("felt_depth", 900, static_cast<int>(60 + 340 * rows)) + blocks +
+  const double height = 60.0 + 340.0 * static_cast<double>(rows);
+  return head("felt_depth", 900, static_cast<int>(height)) + blocks +
          fmt::format(
-             "set multiplot layout {},{} margins screen 0.08, screen 0.98, screen {:.4f}, screen {:.4f} spacing screen 0.05, screen 0.13\n"
+             "set multiplot layout {},{} margins screen 0.08, screen 0.98, screen {:.4f}, screen {:.4f} spacing screen 0.05, screen "
+             "{:.4f}\n"
              "set xrange [{:.5g}:{:.5g}]\nset yrange [{:.5g}:{:.5g}]\nset key top left Left reverse samplen 1.5 width -1\n"
              "set xlabel 'depth of the virtual tip [mm]'\nset xzeroaxis lc rgb '{}' lt 1 lw 1\n{}unset multiplot\n",
-             rows, columns, 60.0 / (60.0 + 340.0 * static_cast<double>(rows)), 1.0 - 40.0 / (60.0 + 340.0 * static_cast<double>(rows)),
-             std::floor(highest - 1.0), std::ceil(deepest + 1.0), least - margin, most + margin, dark, panels);
+             rows, columns, 80.0 / height, 1.0 - 40.0 / height, 110.0 / height, std::floor(highest - 1.0), std::ceil(deepest + 1.0),
+             least - margin, most + margin, dark, panels);
 }
 
 std::string display_energy_script(const std::vector<Felt>& displays) {
@@ -374,22 +376,25 @@ std::vector<Figure> draw_figures(const RunInfo& run, const Summary& summary, std
     add(felt_time_script(run, displays),
         {"felt_time.svg", "Force against time",
          "Along the needle, means in slices of time. Hand: on the handle, as the controller estimated it, and as it was where a simulation "
-         "knows. Model: what the virtual needle's base pushes with; at rest the hand pushes the same."});
+         "knows it. Model: what the virtual needle's base pushes with; at rest the hand pushes the same."});
     add(felt_depth_script(run, displays),
         {"felt_depth.svg", "Force against depth", "The same forces over the depth of the virtual tip: in above, out below."});
     add(display_energy_script(displays),
         {"display_energy.svg", "Energy of the display",
-         "What each display has taken from the hand, less what it gave. A passive one stays above zero but for the guard's bound."});
+         "The guard's account of what a display took from the hand less what it gave. It opens with a small credit, and no more is kept in "
+         "it "
+         "than a spring could give back at the present force; where it would fall below zero the guard damps."});
   } else {
-    add(force_depth_script(run, samples),
-      {"force_depth.svg", "Base force against depth",
-       "Solid: insertion. Dashed: withdrawal. Each point is the mean of a 0.25 mm slice of depth. Dotted: the shaft force density that the "
-       "thesis found at 1 mm/s, from zero at the surface."});
-    add(tracking_script(run, samples),
-      {"tracking.svg", "Tracking error",
-       "Distance between commanded and measured position of the needle's base, in slices of time; below 0.1 µm counts as 0.1 µm. The scale "
-       "is logarithmic."});
-    add(overview_script(run, samples), {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
+    add(force_depth_script(run, samples), {"force_depth.svg", "Base force against depth",
+                                           "Solid: insertion. Dashed: withdrawal. Each point is the mean of a 0.25 mm slice of depth. "
+                                           "Dotted: the shaft force density that the "
+                                           "thesis found at 1 mm/s, from zero at the surface."});
+    add(tracking_script(run, samples), {"tracking.svg", "Tracking error",
+                                        "Distance between commanded and measured position of the needle's base, in slices of time; below "
+                                        "0.1 µm counts as 0.1 µm. The scale "
+                                        "is logarithmic."});
+    add(overview_script(run, samples),
+        {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
   }
   add(histogram_script("tick_time", "execution time of the tick", samples, summary.tick_us,
                        [](const Sample& s) { return static_cast<double>(s.tick_us); }),

@@ -75,7 +75,7 @@ double observer_rise_s(const RunInfo& run, std::span<const Sample> felt) {
   if (most == 0.0) return not_measured;
   double base = 0.0;
   for (std::size_t i = at - before_ticks; i <= at; ++i) base += estimate[i] / static_cast<double>(before_ticks + 1);
-  // The tick in which the truth moves first; its sample could not know yet.
+  // Counted from the last tick before the truth crosses half of its step.
   std::size_t begin = at;
   while (begin < at + step_ticks && std::abs(truth[begin + 1] - truth[at]) < 0.5 * std::abs(most)) ++begin;
   for (std::size_t i = begin; i <= at + after_ticks; ++i)

@@ -121,15 +121,15 @@ std::string insertions_table(const RunInfo& run, const Summary& summary) {
 }
 
 std::string displays_table(const RunInfo& run, const Summary& summary) {
+  if (summary.displays.empty()) return "<p class=\"none\">The run ended before the first display.</p>\n";
   std::string rows;
   const bool known = !run.truth.empty();
   for (const HapticDisplay& d : summary.displays) {
     const auto energy = [](double j) { return number(1e3 * j, 2, "mJ"); };
     rows += fmt::format("<tr><td>{}</td>", escaped(d.name));
-    for (const std::string& cell :
-         {fmt::format("{:.1f}&nbsp;s", d.duration_s), millimetres(d.depth_m, 1), newtons(d.force_n), number(d.difference.rms_n, 3, "N"),
-          number(d.at_rest.rms_n, 3, "N"), energy(d.least_energy_j), fmt::format("{} of {}", d.unsolved_ticks, d.ticks),
-          fmt::format("{}", d.most_contacts)})
+    for (const std::string& cell : {fmt::format("{:.1f}&nbsp;s", d.duration_s), millimetres(d.depth_m, 1), newtons(d.force_n),
+                                    number(d.difference.rms_n, 3, "N"), number(d.at_rest.rms_n, 3, "N"), energy(d.least_energy_j),
+                                    fmt::format("{} of {}", d.unsolved_ticks, d.ticks), fmt::format("{}", d.most_contacts)})
       rows += "<td>" + cell + "</td>";
     if (known)
       rows += fmt::format("<td>{}{}</td>", number(d.observer.rms_n, 3, "N"),
@@ -253,10 +253,11 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
     for (const std::string& note : run.notes) out += "<li>" + escaped(note) + "</li>\n";
     out += "</ul>\n";
   }
-  return out +
-         "<p class=\"sub\">Every number of this run was computed from its samples (capture.mcap, samples.csv). Thesis: S. P. DiMaio, "
-         "Modelling, Simulation and Planning of Needle Motion in Soft Tissues, University of British Columbia, "
-         "2003.</p>\n</body>\n</html>\n";
+  return out + "<p class=\"sub\">Every number of this run was computed from its samples (capture.mcap, samples.csv)" +
+         (haptic ? (run.truth.empty() ? "." : " and what the simulation knew (truth.csv).")
+                 : ". Thesis: S. P. DiMaio, Modelling, Simulation and Planning of Needle Motion in Soft Tissues, University of British "
+                   "Columbia, 2003.") +
+         "</p>\n</body>\n</html>\n";
 }
 
 // A folder beside the results that goes away with what was not renamed out of it.

@@ -4,8 +4,8 @@
 //   axial force    = base_wrench . n                           N, positive while inserting
 //   axial error    = (setpoint - pose) . n                     m, positive while lagging behind an insertion
 //   position error = |setpoint - pose| in the plane            m
-// A hand that feels a virtual needle: depth of the virtual tip, handle force (of the hand on the handle, as estimated) and model force (of the
-// virtual needle's base on the needle) alike from the sample's handle_*, virtual_*. At rest those two are equal.
+// A hand that feels a virtual needle: depth of the virtual tip, handle force (of the hand on the handle, as estimated) and model force (of
+// the virtual needle's base on the needle) alike from the sample's handle_*, virtual_*. At rest those two are equal.
 #pragma once
 
 #include <array>
@@ -51,7 +51,7 @@ struct RunInfo {
   std::vector<Phase> phases;
   std::string sag_gain_set = "thesis";  // the set whose sag F/Kp is reported
   double kp_n_per_m{};                  // its proportional gain; 0: no sag is reported
-  std::vector<Truth> truth;  // increasing ticks; empty for a rig that is no lock-step simulation
+  std::vector<Truth> truth;             // increasing ticks; empty for a rig that is no lock-step simulation
   std::vector<std::string> notes;
 };
 
@@ -106,14 +106,14 @@ struct HapticDisplay {  // a Haptic phase: the ticks of it in which the mode is 
   std::string name;
   std::uint64_t ticks{};
   double duration_s{};
-  double depth_m = not_measured;        // greatest of the virtual tip
-  double force_n = not_measured;        // greatest of the model
-  Difference difference;                // handle force less model force: what friction and inertia of the machine leave
-  Difference at_rest;                   // the same where the handle goes slower than 5 mm/s
+  double depth_m = not_measured;         // greatest of the virtual tip
+  double force_n = not_measured;         // greatest of the model
+  Difference difference;                 // handle force less model force: what friction and inertia of the machine leave
+  Difference at_rest;                    // the same where the handle goes slower than 5 mm/s
   double least_energy_j = not_measured;  // that the display has taken, less what it gave
-  std::uint64_t unsolved_ticks{};       // without a solution of the model
+  std::uint64_t unsolved_ticks{};        // without a solution of the model
   std::uint32_t most_contacts{};
-  Difference observer;                      // estimated handle force less the true one
+  Difference observer;                    // estimated handle force less the true one
   double observer_rise_s = not_measured;  // 90 % of a step of the true force, where there is one (haptic.hpp)
 };
 

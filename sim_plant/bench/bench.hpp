@@ -18,7 +18,8 @@ namespace trocar::sim_plant {
 
 class Bench {
  public:
-  // scene: the tissue in front of the machine, if any. needle: what the controller shows in Haptic; must outlive the bench, as the hand must.
+  // scene: the tissue in front of the machine, if any. needle: what the controller shows in Haptic; must outlive the bench, as the hand
+  // must.
   Bench(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed,
         virtual_needle::VirtualNeedle* needle = nullptr);
 

@@ -24,7 +24,12 @@ HandConfig scaled(HandConfig hand, double factor) noexcept {
 Hand::Hand(const HandConfig& config, const Vector3& pose) : config_(config), random_(config.seed) { hold(pose); }
 
 Hand::Hand(const HandConfig& config, Habit habit)
-    : config_(config), way_(habit.way), recording_(std::move(habit.recording)), habit_(std::move(habit)), random_(config.seed), holds_(false) {}
+    : config_(config),
+      way_(habit.way),
+      recording_(std::move(habit.recording)),
+      habit_(std::move(habit)),
+      random_(config.seed),
+      holds_(false) {}
 
 void Hand::want(std::vector<Intention> way) { way_ = std::move(way); }
 void Hand::replay(std::vector<RecordedWrench> recording) { recording_ = std::move(recording); }

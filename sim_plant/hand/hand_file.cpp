@@ -84,9 +84,7 @@ std::vector<RecordedWrench> read_recording(const std::filesystem::path& file) {
   if (!in || !std::getline(in, line)) throw config::UserError(fmt::format("{}: cannot be read, or is empty; {}", file.string(), remedy));
   const std::string header = line;  // the names are views of it
   const auto names = fields(header);
-  const auto column = [&](const std::string& name) {
-    return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
-  };
+  const auto column = [&](const std::string& name) { return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()); };
   const std::string who = column("hand_fx_n") < names.size() ? "hand_" : "handle_";
   const std::array<std::string, 4> wanted{"time_ns", who + "fx_n", who + "fy_n", who + "tau_nm"};
   std::array<std::size_t, 4> at{};
@@ -99,12 +97,14 @@ std::vector<RecordedWrench> read_recording(const std::filesystem::path& file) {
   double begin_s = 0.0;
   for (std::size_t number = 2; std::getline(in, line); ++number) {
     const auto words = fields(line);
-    if (words.size() != names.size()) fail(number, fmt::format("{} fields instead of {}; was the file cut off?", words.size(), names.size()));
+    if (words.size() != names.size())
+      fail(number, fmt::format("{} fields instead of {}; was the file cut off?", words.size(), names.size()));
     std::array<double, 4> value{};
     for (std::size_t k = 0; k < 4; ++k) {
       const std::string_view word = words[at[k]];
       const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value[k]);
-      if (error != std::errc{} || end != word.data() + word.size()) fail(number, fmt::format("{} = {}: no number; {}", wanted[k], word, remedy));
+      if (error != std::errc{} || end != word.data() + word.size())
+        fail(number, fmt::format("{} = {}: no number; {}", wanted[k], word, remedy));
     }
     const bool pushes = std::isfinite(value[1]) && std::isfinite(value[2]) && std::isfinite(value[3]);
     RecordedWrench r{1e-9 * value[0], {}};

@@ -21,8 +21,8 @@ namespace trocar::sim_plant {
 // `seed` is the simulation's; the tremor has noise of its own from it. Throws config::UserError with file, line, key and remedy.
 [[nodiscard]] Hand read_hand(const std::filesystem::path& file, std::uint64_t seed);
 
-// Columns time_ns and hand_* (truth.csv) or handle_* (samples.csv); fx_n, fy_n, tau_nm each. NaN counts as no force. Time 0 is the first row
-// with one. Throws config::UserError.
+// Columns time_ns and hand_* (truth.csv) or handle_* (samples.csv); fx_n, fy_n, tau_nm each. NaN counts as no force. Time 0 is the first
+// row with one. Throws config::UserError.
 [[nodiscard]] std::vector<RecordedWrench> read_recording(const std::filesystem::path& file);
 
 }  // namespace trocar::sim_plant

@@ -31,7 +31,7 @@ class Phantom {
   Vector3 advance(const Vector3& base_pose, double dt_s) noexcept;
 
   [[nodiscard]] const Vector3& base_wrench() const noexcept { return wrench_; }
-  [[nodiscard]] bool empty() const noexcept { return insertion_ == nullptr; }  // no scene
+  [[nodiscard]] bool empty() const noexcept { return insertion_ == nullptr; }                   // no scene
   [[nodiscard]] const insertion::Insertion& insertion() const noexcept { return *insertion_; }  // with a scene only
   [[nodiscard]] std::size_t contacts() const noexcept { return empty() ? 0 : insertion_->contacts(); }
 

@@ -21,8 +21,8 @@ namespace trocar::sim_plant {
 
 class Plant {
  public:
-  // Without a scene nothing stands in front of the machine. Throws std::invalid_argument (fem::Error for the scene): a rig that is no twin, values out of range, a homing pose that the
-  // true mechanism cannot take.
+  // Without a scene nothing stands in front of the machine. Throws std::invalid_argument (fem::Error for the scene): a rig that is no twin,
+  // values out of range, a homing pose that the true mechanism cannot take.
   Plant(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed);
 
   // Integrates all whole steps that end at or before time_ns with this torque command at the motors, in front of their gears.

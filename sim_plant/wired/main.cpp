@@ -101,8 +101,9 @@ int run(const Options& options) {
     }
   }
   const auto& p = plant->physics();
-  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times; phantom: {} steps, {} unconverged\n",
-             1e-9 * static_cast<double>(p.time_ns()), starved, p.phantom().counters().steps, p.phantom().counters().unconverged);
+  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times", 1e-9 * static_cast<double>(p.time_ns()), starved);
+  if (scene) fmt::print("; phantom: {} steps, {} unconverged", p.phantom().counters().steps, p.phantom().counters().unconverged);
+  fmt::print("\n");
   return 0;
 }
 
@@ -111,7 +112,9 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   bool die_with_parent = false;
-  CLI::App app{"trocar-plant: a simulated rig and tissue on the rig's buses.\nExample: trocar-plant --rig ubc_twin --scene phantom\nA virtual needle: trocar-plant --rig "
+  CLI::App app{
+      "trocar-plant: a simulated rig and tissue on the rig's buses.\nExample: trocar-plant --rig ubc_twin --scene phantom\nA virtual "
+      "needle: trocar-plant --rig "
       "ubc_twin_haptic --plant ubc_twin_haptic --no-tissue --hand person"};
   app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
   auto* scene = app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
