@@ -47,7 +47,7 @@ TEST(WiredPlant, AHandIsTheSameInLongStepsAndInShort) {
 TEST(WiredPlant, PushesNoLongerWhenTheHandleIsTakenAway) {
   Held held;
   auto pose = held.plant.physics().pose();
-  pose[1] += 0.002;
+  pose[1] += 0.008;
   held.hand.want({{0.0, pose}});
   held.plant.advance(20 * millisecond);
   held.plant.give_to(nullptr);
