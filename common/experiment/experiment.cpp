@@ -233,6 +233,8 @@ std::optional<Command> Sequencer::next() {
     return steps_[step_].command;
   }
   if (finished() || sent_ || !seen_ || mode_ == Mode::Off) return std::nullopt;
+  // A homed rig stays so, and its handle may have left the jig: homing there would shift every pose.
+  if (steps_[step_].command.kind == CommandKind::Home && std::isfinite(last_.pose[0])) done_s_ += steps_[step_++].expected_s;
   sent_ = true;
   step_start_ns_ = now_ns_;
   phases_.push_back(steps_[step_].phase);

@@ -16,7 +16,7 @@
 
 namespace trocar::experiment {
 
-// Home, tare, arm; then for each speed, side by side: approach, tare, (touch), insert, dwell, withdraw; disarm.
+// Home unless the rig is homed, tare, arm; then for each speed, side by side: approach, tare, (touch), insert, dwell, withdraw; disarm.
 struct InsertionCourse {
   std::vector<double> speeds_m_s;  // one insertion each
   double depth_m{};                // of the tip below the entry face
@@ -31,7 +31,7 @@ struct InsertionCourse {
   double thesis_speed_m_s{};
 };
 
-// Home, tare, arm; take_s for the hand to take the handle; then each display for display_s; disarm.
+// Home unless the rig is homed, tare, arm; take_s for the hand to take the handle; then each display for display_s; disarm.
 struct HapticCourse {
   std::vector<Display> displays;
   double display_s{};  // what a person has to feel each

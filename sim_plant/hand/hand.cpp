@@ -27,12 +27,16 @@ Hand::Hand(const HandConfig& config, Habit habit)
     : config_(config),
       way_(habit.way),
       recording_(std::move(habit.recording)),
+      recorded_arm_(habit.recorded_arm),
       habit_(std::move(habit)),
       random_(config.seed),
       holds_(false) {}
 
 void Hand::want(std::vector<Intention> way) { way_ = std::move(way); }
-void Hand::replay(std::vector<RecordedWrench> recording) { recording_ = std::move(recording); }
+void Hand::replay(std::vector<RecordedWrench> recording, const RecordedArm& arm) {
+  recording_ = std::move(recording);
+  recorded_arm_ = arm;
+}
 
 void Hand::notice(bool motors_on, double time_s, const Vector3& pose) noexcept {
   if (!habit_) return;
@@ -74,7 +78,7 @@ Hand::Vector3 Hand::wanted(double time_s) const noexcept {
   return pose;
 }
 
-Hand::Vector3 Hand::recorded(double time_s) const noexcept {
+Hand::Vector3 Hand::recorded(double time_s, const Vector3& pose, const Vector3& velocity) const noexcept {
   time_s -= begin_s_;
   if (time_s < recording_.front().time_s || time_s > recording_.back().time_s) return {};
   const auto after =
@@ -84,7 +88,12 @@ Hand::Vector3 Hand::recorded(double time_s) const noexcept {
   const RecordedWrench& b = *after;
   const double part = (time_s - a.time_s) / (b.time_s - a.time_s);
   Vector3 wrench{};
-  for (std::size_t k = 0; k < 3; ++k) wrench[k] = std::lerp(a.wrench[k], b.wrench[k], part);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double stiffness = k < 2 ? recorded_arm_.stiffness : recorded_arm_.turn_stiffness;
+    const double damping = k < 2 ? recorded_arm_.damping : recorded_arm_.turn_damping;
+    wrench[k] = std::lerp(a.wrench[k], b.wrench[k], part) + stiffness * (std::lerp(a.pose[k], b.pose[k], part) - pose[k]) +
+                damping * ((b.pose[k] - a.pose[k]) / (b.time_s - a.time_s) - velocity[k]);
+  }
   return wrench;
 }
 
@@ -102,7 +111,7 @@ double Hand::tremble(std::size_t axis, double rms, double dt_s) noexcept {
 
 const Hand::Vector3& Hand::advance(double time_s, const Vector3& pose, const Vector3& velocity, double dt_s) noexcept {
   if (!holds_) return wrench_ = {};
-  if (!recording_.empty()) return wrench_ = recorded(time_s);
+  if (!recording_.empty()) return wrench_ = recorded(time_s, pose, velocity);
   const Vector3 wanted_now = wanted(time_s);
   if (!started_) last_wanted_ = wanted_now;
   started_ = true;

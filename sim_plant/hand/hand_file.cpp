@@ -51,6 +51,13 @@ ArmAxis rotation(const config::Table& t) {
   return a;
 }
 
+RecordedArm recorded_arm(const config::Table& t) {
+  return {t.number("stiffness_n_per_m", {0.0, 1e4}, "about the recorded way, such as 200"),
+          t.number("damping_n_s_per_m", {0.0, 1e3}, "about the recorded way, such as 10"),
+          t.number("stiffness_nm_per_rad", {0.0, 100.0}, "about the recorded angle, such as 0.3"),
+          t.number("damping_nm_s_per_rad", {0.0, 10.0}, "about the recorded angle, such as 0.01")};
+}
+
 Habit intention(const config::Table& t) {
   const config::Range speed{1e-4, 1.0};
   const config::Range rest{0.0, 600.0};
@@ -86,9 +93,9 @@ std::vector<RecordedWrench> read_recording(const std::filesystem::path& file) {
   const auto names = fields(header);
   const auto column = [&](const std::string& name) { return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()); };
   const std::string who = column("hand_fx_n") < names.size() ? "hand_" : "handle_";
-  const std::array<std::string, 4> wanted{"time_ns", who + "fx_n", who + "fy_n", who + "tau_nm"};
-  std::array<std::size_t, 4> at{};
-  for (std::size_t k = 0; k < 4; ++k) {
+  const std::array<std::string, 7> wanted{"time_ns", who + "fx_n", who + "fy_n", who + "tau_nm", "x_m", "y_m", "theta_rad"};
+  std::array<std::size_t, wanted.size()> at{};
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
     at[k] = column(wanted[k]);
     if (at[k] == names.size()) fail(1, fmt::format("there is no column {}; {}", wanted[k], remedy));
   }
@@ -99,15 +106,15 @@ std::vector<RecordedWrench> read_recording(const std::filesystem::path& file) {
     const auto words = fields(line);
     if (words.size() != names.size())
       fail(number, fmt::format("{} fields instead of {}; was the file cut off?", words.size(), names.size()));
-    std::array<double, 4> value{};
-    for (std::size_t k = 0; k < 4; ++k) {
+    std::array<double, wanted.size()> value{};
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
       const std::string_view word = words[at[k]];
       const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value[k]);
       if (error != std::errc{} || end != word.data() + word.size())
         fail(number, fmt::format("{} = {}: no number; {}", wanted[k], word, remedy));
     }
     const bool pushes = std::isfinite(value[1]) && std::isfinite(value[2]) && std::isfinite(value[3]);
-    RecordedWrench r{1e-9 * value[0], {}};
+    RecordedWrench r{1e-9 * value[0], {}, {value[4], value[5], value[6]}};
     if (pushes) r.wrench = {value[1], value[2], value[3]};
     if (all.empty()) {
       if (r.wrench == std::array<double, 3>{}) continue;
@@ -116,6 +123,8 @@ std::vector<RecordedWrench> read_recording(const std::filesystem::path& file) {
     r.time_s -= begin_s;
     if (!std::isfinite(r.time_s) || (!all.empty() && r.time_s <= all.back().time_s))
       fail(number, fmt::format("time_ns = {}: times have to increase; {}", words[at[0]], remedy));
+    if (!std::ranges::all_of(r.pose, [](double x) { return std::isfinite(x); }))
+      fail(number, "the handle's pose is no number; cut the recording off before this line");
     all.push_back(r);
   }
   if (all.empty()) throw config::UserError(fmt::format("{}: no hand pushes in it; {}", file.string(), remedy));
@@ -132,6 +141,7 @@ Hand read_hand(const std::filesystem::path& file, std::uint64_t seed) {
   if (root.has("replay")) {
     std::filesystem::path recording = root.text("replay", "the truth.csv or samples.csv of a haptic run");
     if (recording.is_relative()) recording = file.parent_path() / recording;
+    if (const auto arm = root.optional_table("arm")) habit.recorded_arm = recorded_arm(*arm);
     document.refuse_unknown_keys();
     habit.recording = read_recording(recording);
   } else {

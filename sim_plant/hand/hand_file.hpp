@@ -10,6 +10,8 @@
 // or, instead of all but the first,
 //   replay = "run/truth.csv"      or samples.csv: force of a hand on a handle, relative to this file; begins, after take_after_s, with the
 //                                 first row in which that hand pushes
+//   ([arm] damping_n_s_per_m, stiffness_n_per_m, damping_nm_s_per_rad, stiffness_nm_per_rad: about the recorded motion; without it the
+//     recorded force acts alone, and the handle soon goes its own way)
 #pragma once
 
 #include <filesystem>
@@ -21,8 +23,8 @@ namespace trocar::sim_plant {
 // `seed` is the simulation's; the tremor has noise of its own from it. Throws config::UserError with file, line, key and remedy.
 [[nodiscard]] Hand read_hand(const std::filesystem::path& file, std::uint64_t seed);
 
-// Columns time_ns and hand_* (truth.csv) or handle_* (samples.csv); fx_n, fy_n, tau_nm each. NaN counts as no force. Time 0 is the first
-// row with one. Throws config::UserError.
+// Columns time_ns, x_m, y_m, theta_rad, and hand_* (truth.csv) or handle_* (samples.csv); fx_n, fy_n, tau_nm each. A NaN force is none.
+// Time 0 is the first row with a force; from there on poses have to be finite. Throws config::UserError.
 [[nodiscard]] std::vector<RecordedWrench> read_recording(const std::filesystem::path& file);
 
 }  // namespace trocar::sim_plant

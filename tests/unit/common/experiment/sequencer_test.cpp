@@ -1,7 +1,8 @@
 // The haptic course against a rig that answers by the book, and by it not. (The insertion course runs in tests/integration.)
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct Rig {
     e.course = course;
     sequencer.emplace(e, Placement{0.215, 0.0, 0.1}, data, session);
     sample.mode = Mode::Ready;
+    sample.pose.fill(std::nan(""));  // not homed
   }
   void tick() {
     const auto command = sequencer->next();
@@ -29,6 +31,7 @@ struct Rig {
     Reply reply{session, 0, {}, ReplyCode::Done, {}, sample.tick};
     if (command) {
       sent.push_back(*command);
+      if (command->kind == CommandKind::Home) sample.pose = {0.0, 0.11, 1.5707963267948966};
       if (command->kind == CommandKind::Arm) sample.mode = Mode::Armed;
       if (command->kind == CommandKind::Haptic && haptic_answer == ReplyCode::Done) sample.mode = Mode::Haptic;
       if (command->kind == CommandKind::Disarm) sample.mode = Mode::Ready;
@@ -75,6 +78,18 @@ TEST(HapticCourse, GivesEachDisplayItsTimeAndDisarms) {
   EXPECT_EQ(felt[0].display, Display::Impedance);
   EXPECT_GT(felt[1].first_tick, felt[0].last_tick);
   EXPECT_EQ(rig.sequencer->progress(), 1.0);
+}
+
+// A second run finds the handle where the first one left it, not in its jig.
+TEST(HapticCourse, DoesNotHomeARigThatIsHomed) {
+  Rig rig(two);
+  rig.sample.pose = {0.01, 0.15, 1.5};
+  rig.run(5000);
+  EXPECT_EQ(rig.sequencer->failure(), "");
+  EXPECT_TRUE(rig.sequencer->finished());
+  EXPECT_EQ(rig.sequencer->progress(), 1.0);
+  ASSERT_FALSE(rig.sent.empty());
+  EXPECT_EQ(rig.sent.front().kind, CommandKind::Tare);
 }
 
 TEST(HapticCourse, LeavesTimeToTakeTheHandle) {

@@ -97,8 +97,9 @@ TEST_F(HandFile, RefusesWhatIsWrongWithPlaceAndRemedy) {
 }
 
 TEST_F(HandFile, ReplaysARecordingFromItsFirstForceOn) {
-  std::ofstream(folder_ / "truth.csv") << "tick,time_ns,hand_fx_n,hand_fy_n,hand_tau_nm\n"
-                                          "1,0,0,0,0\n2,500000000,0,0,0\n3,1000000000,1,2,0.1\n4,1500000000,3,4,0.3\n";
+  std::ofstream(folder_ / "truth.csv") << "tick,time_ns,hand_fx_n,hand_fy_n,hand_tau_nm,x_m,y_m,theta_rad\n"
+                                          "1,0,0,0,0,0,0,0\n2,500000000,0,0,0,0,0,0\n"
+                                          "3,1000000000,1,2,0.1,0,0.1,1.5\n4,1500000000,3,4,0.3,0.01,0.1,1.5\n";
   Hand hand = read_hand(write("take_after_s = 0.25\nreplay = \"truth.csv\"\n"), 1);
   hand.notice(true, 10.0, home);
   EXPECT_EQ(hand.advance(10.0, home, {}, dt), Vector3{});
@@ -112,27 +113,49 @@ TEST_F(HandFile, ReplaysARecordingFromItsFirstForceOn) {
   EXPECT_EQ(hand.advance(11.0, home, {}, dt), Vector3{});
 }
 
+// The force of then where the handle is as then; elsewhere the arm's impedance on top of it.
+TEST_F(HandFile, ReplaysWithAnArmAboutTheRecordedMotion) {
+  std::ofstream(folder_ / "truth.csv") << "time_ns,hand_fx_n,hand_fy_n,hand_tau_nm,x_m,y_m,theta_rad\n"
+                                          "0,1,0,0,0.01,0.10,1.0\n1000000000,1,0,0,0.03,0.10,1.0\n";
+  Hand hand = read_hand(write("take_after_s = 0.0\nreplay = \"truth.csv\"\n[arm]\nstiffness_n_per_m = 200.0\ndamping_n_s_per_m = 10.0\n"
+                              "stiffness_nm_per_rad = 0.3\ndamping_nm_s_per_rad = 0.01\n"),
+                        1);
+  hand.notice(true, 0.0, home);
+  const Vector3 same = hand.advance(0.5, {0.02, 0.10, 1.0}, {0.02, 0.0, 0.0}, dt);
+  EXPECT_NEAR(same[0], 1.0, 1e-12);
+  EXPECT_NEAR(same[1], 0.0, 1e-12);
+  EXPECT_NEAR(same[2], 0.0, 1e-12);
+  const Vector3 other = hand.advance(0.5, {0.015, 0.11, 1.2}, {0.0, 0.1, -1.0}, dt);
+  EXPECT_NEAR(other[0], 1.0 + 200.0 * 0.005 + 10.0 * 0.02, 1e-12);
+  EXPECT_NEAR(other[1], -200.0 * 0.01 - 10.0 * 0.1, 1e-12);
+  EXPECT_NEAR(other[2], -0.3 * 0.2 + 0.01 * 1.0, 1e-12);
+  EXPECT_EQ(hand.advance(1.5, home, {}, dt), Vector3{});
+}
+
 TEST_F(HandFile, ReadsTheEstimateOfSamplesToo) {
   std::ofstream(folder_ / "samples.csv")
-      << "tick,time_ns,mode,handle_fx_n,handle_fy_n,handle_tau_nm\n"
-         "1,0,Armed,nan,nan,nan\n2,1000000,Haptic,0.5,0,0\n3,2000000,Haptic,0.25,0,0\n4,3000000,Ready,nan,nan,nan\n";
+      << "tick,time_ns,mode,x_m,y_m,theta_rad,handle_fx_n,handle_fy_n,handle_tau_nm\n"
+         "1,0,Armed,nan,nan,nan,nan,nan,nan\n2,1000000,Haptic,0.01,0.1,1.5,0.5,0,0\n3,2000000,Haptic,0.01,0.1,1.5,0.25,0,0\n"
+         "4,3000000,Ready,0.01,0.1,1.5,nan,nan,nan\n";
   const auto recording = read_recording(folder_ / "samples.csv");
   ASSERT_EQ(recording.size(), 3U);
   EXPECT_EQ(recording[0].time_s, 0.0);
   EXPECT_EQ(recording[0].wrench[0], 0.5);
   EXPECT_NEAR(recording[2].time_s, 0.002, 1e-15);
   EXPECT_EQ(recording[2].wrench, Vector3{});
+  EXPECT_EQ(recording[0].pose, (Vector3{0.01, 0.1, 1.5}));
 }
 
 TEST_F(HandFile, RefusesARecordingThatIsNone) {
   const auto error = [&](std::string_view text) { return error_of(text, [](const auto& file) { return read_recording(file); }); };
-  const std::string head = "time_ns,hand_fx_n,hand_fy_n,hand_tau_nm\n";
+  const std::string head = "time_ns,hand_fx_n,hand_fy_n,hand_tau_nm,x_m,y_m,theta_rad\n";
   expect_parts(error("t_s,x_m\n0,1\n"), {"file.toml:1", "time_ns", "truth.csv"});
   expect_parts(error("time_ns,hand_fx_n\n0,1\n"), {"file.toml:1", "hand_fy_n"});
-  expect_parts(error(head + "0,1,1\n"), {"file.toml:2", "3 fields instead of 4"});
-  expect_parts(error(head + "0,1,one,1\n"), {"file.toml:2", "hand_fy_n", "one"});
-  expect_parts(error(head + "0,1,1,1\n0,1,1,1\n"), {"file.toml:3", "time_ns", "increase"});
-  expect_parts(error(head + "0,0,0,0\n"), {"file.toml", "no hand pushes"});
+  expect_parts(error(head + "0,1,1\n"), {"file.toml:2", "3 fields instead of 7"});
+  expect_parts(error(head + "0,1,one,1,0,0,0\n"), {"file.toml:2", "hand_fy_n", "one"});
+  expect_parts(error(head + "0,1,1,1,0,0,0\n0,1,1,1,0,0,0\n"), {"file.toml:3", "time_ns", "increase"});
+  expect_parts(error(head + "0,1,1,1,nan,0,0\n"), {"file.toml:2", "pose", "cut the recording off"});
+  expect_parts(error(head + "0,0,0,0,0,0,0\n"), {"file.toml", "no hand pushes"});
   expect_parts(error_from([&] { (void)read_recording(folder_ / "none.csv"); }), {"none.csv", "cannot be read"});
 }
 
