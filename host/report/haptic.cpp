@@ -92,7 +92,7 @@ std::vector<HapticDisplay> displays_of(const RunInfo& run, std::span<const Sampl
     d.name = phase.name;
     d.ticks = felt.size();
     if (felt.size() > 1) d.duration_s = 1e-9 * static_cast<double>(felt.back().time_ns - felt.front().time_ns);
-    DifferenceSum difference, at_rest, observer;
+    DifferenceSum difference, at_rest, observer, true_difference;
     for (const Sample& s : felt) {
       d.depth_m = std::fmax(d.depth_m, virtual_depth_m(run, s));
       d.force_n = std::fmax(d.force_n, std::hypot(s.virtual_wrench[0], s.virtual_wrench[1]));
@@ -102,11 +102,15 @@ std::vector<HapticDisplay> displays_of(const RunInfo& run, std::span<const Sampl
       d.unsolved_ticks += s.virtual_status > static_cast<std::uint8_t>(insertion::Status::TipLost) ? 1u : 0u;
       difference.add(s.handle_wrench, s.virtual_wrench);
       if (std::hypot(s.velocity[0], s.velocity[1]) < rest_m_s) at_rest.add(s.handle_wrench, s.virtual_wrench);
-      if (const Truth* t = truth_of(run, s.tick)) observer.add(s.handle_wrench, t->hand_wrench);
+      if (const Truth* t = truth_of(run, s.tick)) {
+        observer.add(s.handle_wrench, t->hand_wrench);
+        true_difference.add(t->hand_wrench, s.virtual_wrench);
+      }
     }
     d.difference = difference.result();
     d.at_rest = at_rest.result();
     d.observer = observer.result();
+    d.true_difference = true_difference.result();
     d.observer_rise_s = observer_rise_s(run, felt);
     all.push_back(std::move(d));
   }

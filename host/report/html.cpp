@@ -53,13 +53,13 @@ std::string millimetres(double metres, int digits = 3) { return number(1e3 * met
 std::string newtons(double n) { return number(n, 2, "N"); }
 std::string micrometres(double metres) { return number(1e6 * metres, 1, "µm"); }
 
-std::string row(std::initializer_list<std::string> cells) {
+std::string row(const std::vector<std::string>& cells) {
   std::string out = "<tr>";
   for (const std::string& cell : cells) out += "<td>" + cell + "</td>";
   return out + "</tr>\n";
 }
 
-std::string table(std::initializer_list<const char*> heads, const std::string& rows) {
+std::string table(const std::vector<const char*>& heads, const std::string& rows) {
   std::string out = "<div class=\"wide\"><table>\n<thead><tr>";
   for (const char* head : heads) out += fmt::format("<th>{}</th>", head);
   return out + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
@@ -122,26 +122,32 @@ std::string insertions_table(const RunInfo& run, const Summary& summary) {
 
 std::string displays_table(const RunInfo& run, const Summary& summary) {
   if (summary.displays.empty()) return "<p class=\"none\">The run ended before the first display.</p>\n";
-  std::string rows;
+  std::vector<const char*> heads{"Display",          "Time",         "Greatest depth", "Greatest model force", "Hand less model, rms",
+                                 "The same at rest", "Least energy", "Ticks unsolved", "Contacts, most"};
   const bool known = !run.truth.empty();
+  if (known) heads.insert(heads.end(), {"True hand less model, rms", "Estimate less true hand, rms"});
+  std::string rows;
   for (const HapticDisplay& d : summary.displays) {
-    const auto energy = [](double j) { return number(1e3 * j, 2, "mJ"); };
-    rows += fmt::format("<tr><td>{}</td>", escaped(d.name));
-    for (const std::string& cell : {fmt::format("{:.1f}&nbsp;s", d.duration_s), millimetres(d.depth_m, 1), newtons(d.force_n),
-                                    number(d.difference.rms_n, 3, "N"), number(d.at_rest.rms_n, 3, "N"), energy(d.least_energy_j),
-                                    fmt::format("{} of {}", d.unsolved_ticks, d.ticks), fmt::format("{}", d.most_contacts)})
-      rows += "<td>" + cell + "</td>";
-    if (known)
-      rows += fmt::format("<td>{}{}</td>", number(d.observer.rms_n, 3, "N"),
-                          std::isfinite(d.observer_rise_s) ? ", rise " + number(1e3 * d.observer_rise_s, 0, "ms") : std::string());
-    rows += "</tr>\n";
+    std::vector<std::string> cells{escaped(d.name),
+                                   number(d.duration_s, 1, "s"),
+                                   millimetres(d.depth_m, 1),
+                                   newtons(d.force_n),
+                                   number(d.difference.rms_n, 3, "N"),
+                                   number(d.at_rest.rms_n, 3, "N"),
+                                   number(1e3 * d.least_energy_j, 2, "mJ"),
+                                   fmt::format("{} of {}", d.unsolved_ticks, d.ticks),
+                                   fmt::format("{}", d.most_contacts)};
+    if (known) {
+      const bool rises = std::isfinite(d.observer_rise_s);
+      cells.push_back(number(d.true_difference.rms_n, 3, "N"));
+      cells.push_back(number(d.observer.rms_n, 3, "N") + (rises ? ", rise " + number(1e3 * d.observer_rise_s, 0, "ms") : std::string()));
+    }
+    rows += row(cells);
   }
-  std::string heads;
-  for (const char* head : {"Display", "Time", "Greatest depth", "Greatest model force", "Hand less model, rms", "The same at rest",
-                           "Least energy", "Ticks unsolved", "Contacts, most"})
-    heads += fmt::format("<th>{}</th>", head);
-  if (known) heads += "<th>Estimate less true hand, rms</th>";
-  return "<div class=\"wide\"><table>\n<thead><tr>" + heads + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+  return table(heads, rows) +
+         "<p class=\"sub\">Hand: its force on the handle, as the controller estimates it from encoders and motors, with the noise of that. "
+         "At "
+         "rest: where the handle goes slower than 5&nbsp;mm/s.</p>\n";
 }
 
 std::string tracking_table(const Summary& summary) {

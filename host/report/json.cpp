@@ -83,6 +83,7 @@ std::string json(const HapticDisplay& d) {
                  {"unsolved_ticks", std::to_string(d.unsolved_ticks)},
                  {"most_contacts", std::to_string(d.most_contacts)},
                  {"observer_error", json(d.observer)},
+                 {"true_hand_less_model", json(d.true_difference)},
                  {"observer_rise_s", number(d.observer_rise_s)}});
 }
 

@@ -114,6 +114,7 @@ struct HapticDisplay {  // a Haptic phase: the ticks of it in which the mode is 
   std::uint64_t unsolved_ticks{};        // without a solution of the model
   std::uint32_t most_contacts{};
   Difference observer;                    // estimated handle force less the true one
+  Difference true_difference;             // true handle force less model force
   double observer_rise_s = not_measured;  // 90 % of a step of the true force, where there is one (haptic.hpp)
 };
 

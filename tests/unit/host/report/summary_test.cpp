@@ -170,6 +170,7 @@ TEST(Summary, FindsWhatTheHandFelt) {
   EXPECT_EQ(d.most_contacts, 8u);
   EXPECT_EQ(d.observer.ticks, 2000u);
   EXPECT_NEAR(d.observer.rms_n, truth.estimate_error_n, 1e-12);
+  EXPECT_NEAR(d.true_difference.rms_n, truth.friction_n, 1e-12);
   EXPECT_TRUE(std::isnan(d.observer_rise_s)) << "a hand that pushes smoothly has no step";
   EXPECT_NEAR(s.displays[1].observer_rise_s, 1e-3 * truth.rise_ticks, 1e-12);
 }
