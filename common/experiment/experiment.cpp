@@ -11,7 +11,8 @@ namespace trocar::experiment {
 
 namespace {
 
-constexpr std::array<const char*, 6> phase_names{"prepare", "air", "touch", "insert", "dwell", "withdraw"};
+constexpr std::array<const char*, 7> phase_names{"prepare", "air", "touch", "insert", "dwell", "withdraw", "haptic"};
+constexpr std::array<const char*, 3> display_names{"four_channel", "impedance", "admittance"};
 constexpr double turn_speed_rad_s = 0.5;
 constexpr double reply_timeout_s = 3.0;  // beyond what the step itself should take, twice over
 constexpr std::int64_t ask_again_after_ns = 200'000'000;
@@ -27,17 +28,30 @@ std::optional<PhaseKind> phase_kind(const std::string& name) {
   return std::nullopt;
 }
 
+const char* to_string(Display display) noexcept { return display_names[static_cast<std::size_t>(display)]; }
+
+std::optional<Display> display_of(const std::string& name) {
+  for (std::size_t i = 0; i < display_names.size(); ++i)
+    if (name == display_names[i]) return static_cast<Display>(i);
+  return std::nullopt;
+}
+
 Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, const rig::Rig& rig, std::uint64_t session)
-    : experiment_(experiment), placement_(placement), rig_(rig), session_(session) {
+    : placement_(placement), rig_(rig), session_(session) {
   planned_gains_ = rig.gain_set[0].name.data();
   planned_ = {rig.homing_pose[0], rig.homing_pose[1]};
-  const Experiment& e = experiment_;
 
   add_wait(PhaseKind::Prepare, "settle", 0.2);
   add(PhaseKind::Prepare, "home", CommandKind::Home, 0.1);
   add(PhaseKind::Prepare, "tare", CommandKind::Tare, 0.3);
   add(PhaseKind::Prepare, "arm", CommandKind::Arm, 0.1);
 
+  std::visit([&](const auto& course) { add_course(course); }, experiment.course);
+  add(PhaseKind::Prepare, "disarm", CommandKind::Disarm, 0.1);
+  for (const Step& s : steps_) expected_total_s_ += s.expected_s;
+}
+
+void Sequencer::add_course(const InsertionCourse& e) {
   const std::size_t lanes = e.speeds_m_s.size() + (e.thesis_check ? 1 : 0);
   const auto lane_x = [&](std::size_t lane) {
     return placement_.centre_x_m + e.lane_spacing_m * (static_cast<double>(lane) - 0.5 * static_cast<double>(lanes - 1));
@@ -54,34 +68,42 @@ Sequencer::Sequencer(const Experiment& experiment, const Placement& placement, c
       steps_.back().expected_s = e.standoff_m / e.touch_speed_m_s;
       add_move(PhaseKind::Touch, "back from touch", x, -e.standoff_m, e.withdraw_speed_m_s);
     }
-    add_insertion(fmt::format("{:g} mm/s", 1e3 * v), x, v);
+    add_insertion(e, fmt::format("{:g} mm/s", 1e3 * v), x, v);
   }
   if (e.thesis_check) {
     const double x = lane_x(lanes - 1);
     add_move(PhaseKind::Air, "approach thesis lane", x, -e.standoff_m, e.approach_speed_m_s);
     add(PhaseKind::Prepare, "thesis gains", CommandKind::SelectGains, 0.1);
-    for (std::size_t i = 0; i < rig.gain_sets; ++i)
-      if (std::string(rig.gain_set[i].name.data()) == "thesis") {
+    for (std::size_t i = 0; i < rig_.gain_sets; ++i)
+      if (std::string(rig_.gain_set[i].name.data()) == "thesis") {
         steps_.back().command.gain_set = static_cast<std::uint8_t>(i);
         planned_gains_ = "thesis";
       }
     if (planned_gains_ != "thesis")
       throw std::invalid_argument(
-          fmt::format("rig {} has no gain set named thesis: add one to its file, or set thesis_check = false", rig.name.data()));
-    add_insertion(fmt::format("thesis gains, {:g} mm/s", 1e3 * e.thesis_speed_m_s), x, e.thesis_speed_m_s);
+          fmt::format("rig {} has no gain set named thesis: add one to its file, or set thesis_check = false", rig_.name.data()));
+    add_insertion(e, fmt::format("thesis gains, {:g} mm/s", 1e3 * e.thesis_speed_m_s), x, e.thesis_speed_m_s);
     add(PhaseKind::Prepare, "default gains", CommandKind::SelectGains, 0.1);
-    planned_gains_ = rig.gain_set[0].name.data();
+    planned_gains_ = rig_.gain_set[0].name.data();
     add_wait(PhaseKind::Prepare, "settle", 0.5);
   }
-  add_move(PhaseKind::Air, "return", rig.homing_pose[0], rig.homing_pose[1] + placement_.needle_length_m - placement_.surface_y_m,
+  add_move(PhaseKind::Air, "return", rig_.homing_pose[0], rig_.homing_pose[1] + placement_.needle_length_m - placement_.surface_y_m,
            e.approach_speed_m_s);
-  add(PhaseKind::Prepare, "disarm", CommandKind::Disarm, 0.1);
-  for (const Step& s : steps_) expected_total_s_ += s.expected_s;
+}
+
+void Sequencer::add_course(const HapticCourse& e) {
+  add_wait(PhaseKind::Prepare, "take the handle", e.take_s);
+  for (const Display display : e.displays) {
+    add(PhaseKind::Haptic, to_string(display), CommandKind::Haptic, e.display_s);
+    Step& s = steps_.back();
+    s.command.display = s.phase.display = display;
+    s.wait_s = e.display_s;
+  }
 }
 
 void Sequencer::add(PhaseKind kind, std::string name, CommandKind command, double expected_s) {
   Step s;
-  s.phase = {std::move(name), kind, 0.0, planned_gains_, 0, 0};
+  s.phase = {std::move(name), kind, 0.0, planned_gains_, 0, 0, {}};
   s.command.session = session_;
   s.command.id = static_cast<std::uint32_t>(steps_.size() + 1);
   s.command.kind = command;
@@ -114,21 +136,26 @@ void Sequencer::add_wait(PhaseKind kind, std::string name, double seconds) {
   steps_.back().wait_s = seconds;
 }
 
-void Sequencer::add_insertion(const std::string& name, double x_m, double speed_m_s) {
-  add_move(PhaseKind::Insert, "insert at " + name, x_m, experiment_.depth_m, speed_m_s);
-  if (experiment_.dwell_s > 0.0) add_wait(PhaseKind::Dwell, "dwell", experiment_.dwell_s);
-  add_move(PhaseKind::Withdraw, "withdraw after " + name, x_m, -experiment_.standoff_m, experiment_.withdraw_speed_m_s);
+void Sequencer::add_insertion(const InsertionCourse& e, const std::string& name, double x_m, double speed_m_s) {
+  add_move(PhaseKind::Insert, "insert at " + name, x_m, e.depth_m, speed_m_s);
+  if (e.dwell_s > 0.0) add_wait(PhaseKind::Dwell, "dwell", e.dwell_s);
+  add_move(PhaseKind::Withdraw, "withdraw after " + name, x_m, -e.standoff_m, e.withdraw_speed_m_s);
 }
 
 void Sequencer::fail(std::string why) {
   if (failure_.empty()) failure_ = std::move(why);
 }
 
+void Sequencer::begin_wait() {
+  waiting_ = true;
+  step_start_ns_ = now_ns_;
+}
+
 void Sequencer::advance() {
   phases_.back().last_tick = now_tick_;
   done_s_ += steps_[step_].expected_s;
   ++step_;
-  sent_ = false;
+  sent_ = waiting_ = false;
 }
 
 void Sequencer::on_reply(const Reply& reply) {
@@ -141,6 +168,11 @@ void Sequencer::on_reply(const Reply& reply) {
       if (s.must_stop_early) {
         fail(fmt::format("{}: no force above {:g} N was felt before the end of the move: is the tissue where the scene says?", s.phase.name,
                          s.command.stop_force_n));
+        return;
+      }
+      if (s.wait_s > 0.0) {  // counted from where the command took effect
+        begin_wait();
+        phases_.back().first_tick = reply.tick;
         return;
       }
       advance();
@@ -181,10 +213,15 @@ void Sequencer::on_sample(const Sample& sample) {
     fail(fmt::format("{}: the rig latched the fault {}", s.phase.name, trocar::to_string(sample.fault)));
     return;
   }
+  // Samples of before the change may come after its reply.
+  if (waiting_ && s.command.kind == CommandKind::Haptic && sample.tick > phases_.back().first_tick && mode_ != Mode::Haptic) {
+    fail(fmt::format("{}: the rig left Haptic for {}", s.phase.name, trocar::to_string(mode_)));
+    return;
+  }
   const double elapsed_s = 1e-9 * static_cast<double>(now_ns_ - step_start_ns_);
-  if (s.wait_s > 0.0) {
+  if (waiting_) {
     if (elapsed_s >= s.wait_s) advance();
-  } else if (elapsed_s > 2.0 * s.expected_s + reply_timeout_s) {
+  } else if (elapsed_s > 2.0 * (s.expected_s - s.wait_s) + reply_timeout_s) {
     fail(fmt::format("{}: no answer to {} for {:.1f} s (mode {})", s.phase.name, trocar::to_string(s.command.kind), elapsed_s,
                      trocar::to_string(mode_)));
   }
@@ -196,13 +233,17 @@ std::optional<Command> Sequencer::next() {
     return steps_[step_].command;
   }
   if (finished() || sent_ || !seen_ || mode_ == Mode::Off) return std::nullopt;
+  // A homed rig stays so, and its handle may have left the jig: homing there would shift every pose.
+  if (steps_[step_].command.kind == CommandKind::Home && std::isfinite(last_.pose[0])) done_s_ += steps_[step_++].expected_s;
   sent_ = true;
   step_start_ns_ = now_ns_;
   phases_.push_back(steps_[step_].phase);
   phases_.back().first_tick = now_tick_;
   phases_.back().last_tick = now_tick_;
-  if (steps_[step_].wait_s > 0.0) return std::nullopt;
-  return steps_[step_].command;
+  const Command& command = steps_[step_].command;
+  if (command.kind != CommandKind::KeepAlive) return command;
+  begin_wait();
+  return std::nullopt;
 }
 
 double Sequencer::progress() const noexcept {
@@ -220,7 +261,14 @@ const std::string& Sequencer::phase_name() const noexcept {
 }
 
 double Sequencer::tip_depth_m(const Sample& sample) const noexcept {
-  return sample.pose[1] + placement_.needle_length_m * std::sin(sample.pose[2]) - placement_.surface_y_m;
+  const auto& pose = sample.mode == Mode::Haptic ? sample.virtual_pose : sample.pose;
+  return pose[1] + placement_.needle_length_m * std::sin(pose[2]) - placement_.surface_y_m;
+}
+
+double Sequencer::axial_force_n(const Sample& sample) const noexcept {
+  const auto& pose = sample.mode == Mode::Haptic ? sample.virtual_pose : sample.pose;
+  const auto& wrench = sample.mode == Mode::Haptic ? sample.virtual_wrench : sample.base_wrench;
+  return wrench[0] * std::cos(pose[2]) + wrench[1] * std::sin(pose[2]);
 }
 
 }  // namespace trocar::experiment

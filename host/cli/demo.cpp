@@ -13,11 +13,16 @@
 #include <numbers>
 #include <optional>
 #include <sstream>
+#include <string_view>
 
 #include "common/capture/rig_capture.hpp"
 #include "common/capture/samples_csv.hpp"
+#include "common/condense/compile.hpp"
+#include "common/config/new_file.hpp"
 #include "common/config/user_error.hpp"
 #include "common/experiment/experiment_file.hpp"
+#include "common/experiment/truth_file.hpp"
+#include "common/scene/scene.hpp"
 #include "host/cli/process.hpp"
 #include "host/experiment/runner.hpp"
 #include "host/report/report.hpp"
@@ -68,7 +73,7 @@ std::filesystem::path make_folder(std::filesystem::path out) {
   if (error)
     throw config::UserError(
         fmt::format("{}: cannot write there ({}): give a folder that you may write to with --out", out.string(), error.message()));
-  for (const char* name : {"capture.mcap", "samples.csv", "run.toml", "report.html"})
+  for (const char* name : {"capture.mcap", "samples.csv", "truth.csv", "model.image", "run.toml", "report.html"})
     if (std::filesystem::exists(out / name))
       throw config::UserError(fmt::format("{}: holds {} of an earlier run: give another folder with --out, or none", out.string(), name));
   return out;
@@ -81,6 +86,7 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
     arguments.push_back("--speeds");
     arguments.push_back(fmt::format("{}", fmt::join(options.speeds_mm_s, ",")));
   }
+  if (!options.hand.empty()) arguments.insert(arguments.end(), {"--hand", options.hand});
   Process bench("trocar-bench", arguments);
   ProgressLine line;
   std::string rest;
@@ -98,7 +104,8 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
       host::Progress p;
       if (in >> word >> p.fraction >> p.depth_mm >> p.force_n >> mode && word == "progress") {
         std::getline(in >> std::ws, p.phase);
-        p.mode = mode == "Position" ? Mode::Position : Mode::Ready;
+        for (const Mode m : {Mode::Off, Mode::Ready, Mode::Armed, Mode::Position, Mode::Haptic, Mode::Hold, Mode::Fault})
+          if (mode == to_string(m)) p.mode = m;
         line.show(p);
       } else {
         said += one + "\n";
@@ -111,18 +118,38 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
   return code;
 }
 
+void compile_image(const std::filesystem::path& scene, const std::filesystem::path& image, const std::atomic<bool>& stop) {
+  condense::Options options;
+  options.visible = condense::WithVisible::No;
+  options.progress = [&stop](std::string_view, double) {
+    if (stop.load()) throw config::UserError("stopped by the user; nothing was run");
+  };
+  const auto bytes = condense::compile_to_memory(scene::read_scene(scene), options).image;
+  config::NewFile file(image);
+  file.stream().write(reinterpret_cast<const char*>(bytes.span().data()), static_cast<std::streamsize>(bytes.span().size()));
+  file.keep();
+}
+
 int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out,
                   std::atomic<bool>& stop) {
   const std::uint32_t domain = options.domain >= 0 ? static_cast<std::uint32_t>(options.domain) : setup.rig.dds_domain;
   std::optional<Process> plant, rig, recorder;
   if (options.own_rig) {
-    std::vector<std::string> plant_arguments{"--rig",  setup.rig_file.string(),      "--scene",          setup.scene_file.string(),
-                                             "--seed", std::to_string(options.seed), "--die-with-parent"};
+    std::vector<std::string> plant_arguments{"--rig", setup.rig_file.string(), "--seed", std::to_string(options.seed), "--die-with-parent"};
+    std::vector<std::string> rig_arguments{"--rig",         setup.rig_file.string(), "--domain", std::to_string(domain),
+                                           "--best-effort", "--die-with-parent"};
     if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
+    if (setup.experiment.haptic()) {  // the scene is the controller's model, and nothing stands in front of the machine but a person
+      const auto image = out / "model.image";
+      compile_image(setup.scene_file, image, stop);
+      plant_arguments.insert(plant_arguments.end(), {"--no-tissue", "--hand", setup.experiment.hand});
+      rig_arguments.insert(rig_arguments.end(), {"--model", image.string()});
+    } else {
+      plant_arguments.insert(plant_arguments.end(), {"--scene", setup.scene_file.string()});
+    }
     plant.emplace("trocar-plant", plant_arguments);
-    plant->wait_for_line("before scene", ready_s);
-    rig.emplace("trocar-rig", std::vector<std::string>{"--rig", setup.rig_file.string(), "--domain", std::to_string(domain),
-                                                       "--best-effort", "--die-with-parent"});
+    plant->wait_for_line(", seed", ready_s);
+    rig.emplace("trocar-rig", rig_arguments);
     rig->wait_for_line("DDS domain", ready_s);
   }
   recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain",
@@ -182,6 +209,8 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
       return To::Dwell;
     case From::Withdraw:
       return To::Withdraw;
+    case From::Haptic:
+      return To::Haptic;
     case From::Prepare:
       return To::Other;
   }
@@ -189,6 +218,15 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
 }
 
 void print_summary(const report::Summary& s) {
+  for (const auto& d : s.displays) {
+    if (d.ticks == 0) {
+      fmt::print("{:<12} was not felt\n", d.name);
+      continue;
+    }
+    fmt::print("{:<12} depth {:5.1f} mm, force {:6.3f} N, hand less model {:.3f} N RMS, least energy {:+.1f} mJ, {} of {} ticks unsolved\n",
+               d.name, 1e3 * d.depth_m, d.force_n, d.difference.rms_n, 1e3 * d.least_energy_j, d.unsolved_ticks, d.ticks);
+    if (d.observer.ticks > 0) fmt::print("{:<12} estimate less true hand {:.3f} N RMS\n", "", d.observer.rms_n);
+  }
   for (const auto& i : s.insertions)
     fmt::print("{:<34} force at depth {:6.3f} N, slope {:5.1f} N/m, tracking RMS {:.3f} mm\n", i.name, i.full_depth_force_n,
                i.fit ? i.fit->slope_n_per_m : report::not_measured, 1e3 * i.insert.rms_m);
@@ -216,6 +254,7 @@ int make_report(const std::filesystem::path& folder, bool json) {
   info.folder = folder;
   info.rig = run.rig;
   info.scene = run.scene;
+  info.kind = run.haptic ? report::RunInfo::Kind::Haptic : report::RunInfo::Kind::Insertion;
   info.lockstep = run.lockstep;
   info.surface_y_m = run.placement.surface_y_m;
   info.needle_length_m = run.placement.needle_length_m;
@@ -228,6 +267,8 @@ int make_report(const std::filesystem::path& folder, bool json) {
     const bool back = p.kind == experiment::PhaseKind::Withdraw && insertion_speed_m_s > 0.0;
     info.phases.push_back({p.name, report_kind(p.kind), back ? insertion_speed_m_s : p.speed_m_s, p.gain_set, p.first_tick, p.last_tick});
   }
+  if (std::filesystem::exists(folder / "truth.csv"))
+    for (const experiment::Truth& t : experiment::read_truth(folder / "truth.csv")) info.truth.push_back({t.tick, t.hand_wrench});
   if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
   if (run.lockstep)
     info.notes.push_back(
@@ -246,7 +287,7 @@ int make_report(const std::filesystem::path& folder, bool json) {
 int run_demo(const DemoOptions& options, std::atomic<bool>& stop) {
   std::vector<double> speeds;
   for (const double v : options.speeds_mm_s) speeds.push_back(1e-3 * v);
-  const host::ExperimentSetup setup = host::read_setup(options.experiment, speeds);
+  const host::ExperimentSetup setup = host::read_setup(options.experiment, speeds, options.hand);
   const auto out = make_folder(options.out);
   int code = 1;
   try {
@@ -254,7 +295,10 @@ int run_demo(const DemoOptions& options, std::atomic<bool>& stop) {
   } catch (...) {
     // Nothing half-made stays behind: a folder that holds no recording is removed again.
     std::error_code ignored;
-    if (!std::filesystem::exists(out / "capture.mcap")) std::filesystem::remove(out, ignored);
+    if (!std::filesystem::exists(out / "capture.mcap")) {
+      std::filesystem::remove(out / "model.image", ignored);
+      std::filesystem::remove(out, ignored);
+    }
     throw;
   }
   if (std::filesystem::exists(out / "run.toml")) make_report(out, options.json);

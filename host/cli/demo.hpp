@@ -12,6 +12,7 @@ namespace trocar::cli {
 struct DemoOptions {
   std::string experiment = "insertion";
   std::vector<double> speeds_mm_s;  // empty: the experiment's own
+  std::string hand;                 // empty: the experiment's own
   std::filesystem::path out;        // empty: runs/<time>
   bool lockstep{};                  // on the bench instead of processes
   bool own_rig{true};               // start plant and controller; false: they run already

@@ -54,9 +54,17 @@ int main(int argc, char** argv) {
 
   cli::DemoOptions demo;
   auto* demo_command =
-      app.add_subcommand("demo", "the whole simulated experiment: plant, controller, recorder, report\nExample: trocar demo --speeds 1,9");
+      app.add_subcommand("demo",
+                         "the whole simulated experiment: plant, controller, recorder, report\nExample: trocar demo --speeds 1,9\nA "
+                         "virtual needle in a simulated hand: trocar demo --haptic");
   with_experiment(demo_command, demo);
-  demo_command->add_option("--experiment", demo.experiment, "experiment name, or path of its TOML file")->capture_default_str();
+  auto* which =
+      demo_command->add_option("--experiment", demo.experiment, "experiment name, or path of its TOML file")->capture_default_str();
+  demo_command
+      ->add_flag_callback(
+          "--haptic", [&] { demo.experiment = "haptic"; }, "the same as --experiment haptic: a virtual needle in the hand")
+      ->excludes(which);
+  demo_command->add_option("--hand", demo.hand, "who holds the simulated rig's handle, instead of the experiment's: hand name, or path");
   demo_command->add_flag("--lockstep", demo.lockstep, "on the bench: one process, virtual clock, repeatable to the bit");
   demo_command->add_option("--seed", demo.seed, "of the simulated noise")->capture_default_str();
   demo_command->callback([&] {
@@ -68,7 +76,9 @@ int main(int argc, char** argv) {
   experiment_command->require_subcommand(1);
   cli::DemoOptions experiment;
   experiment.own_rig = false;
-  auto* run_command = experiment_command->add_subcommand("run", "Example: trocar experiment run insertion --speeds 3");
+  auto* run_command = experiment_command->add_subcommand(
+      "run",
+      "Example: trocar experiment run insertion --speeds 3\nWith a trocar-rig that was given a --model: trocar experiment run haptic");
   run_command->add_option("experiment", experiment.experiment, "experiment name, or path of its TOML file")->required();
   with_experiment(run_command, experiment);
   run_command->callback([&] {

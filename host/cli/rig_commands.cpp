@@ -8,6 +8,7 @@
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/experiment/experiment.hpp"
 #include "common/mechanism/capability.hpp"
 #include "common/rig/bus_budget.hpp"
 #include "host/rig/client.hpp"
@@ -169,7 +170,7 @@ int rig_haptic(std::uint32_t domain, const std::string& display, std::atomic<boo
   if (say(client.ask(CommandKind::Arm, answer_s)) != 0) return 1;
   Command command;
   command.kind = CommandKind::Haptic;
-  command.display = display == "impedance" ? Display::Impedance : display == "admittance" ? Display::Admittance : Display::FourChannel;
+  command.display = experiment::display_of(display).value_or(Display::FourChannel);
   const host::RigReply shown = client.ask(command, answer_s);
   if (say(shown) != 0) {
     (void)client.ask(CommandKind::Disarm, answer_s);

@@ -25,10 +25,10 @@ constexpr std::size_t p99_window = 1000;
 
 }  // namespace
 
-ExperimentSetup read_setup(const std::string& name, const std::vector<double>& speeds_m_s) {
+ExperimentSetup read_setup(const std::string& name, const std::vector<double>& speeds_m_s, const std::string& hand) {
   ExperimentSetup s;
   s.experiment = experiment::read_experiment(config::find_share("experiments", name));
-  if (!speeds_m_s.empty()) s.experiment.speeds_m_s = speeds_m_s;
+  experiment::replace(s.experiment, speeds_m_s, hand);
   s.rig_file = config::find_share("rigs", s.experiment.rig);
   s.rig = config::read_twin(s.rig_file);
   s.scene_file = config::find_share("scenes", s.experiment.scene);
@@ -116,7 +116,7 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
       progress.fraction = sequencer.progress();
       progress.remaining_s = (1.0 - progress.fraction) * sequencer.expected_s();
       progress.depth_mm = 1e3 * sequencer.tip_depth_m(sample);
-      progress.force_n = sample.base_wrench[0] * std::cos(sample.pose[2]) + sample.base_wrench[1] * std::sin(sample.pose[2]);
+      progress.force_n = sequencer.axial_force_n(sample);
       progress.mode = sample.mode;
       auto sorted = ticks_us;
       std::sort(sorted.begin(), sorted.end());
@@ -127,6 +127,7 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
 
   experiment::Run run;
   run.experiment = setup.experiment.name;
+  run.haptic = setup.experiment.haptic();
   run.rig = setup.rig.name.data();
   run.scene = setup.experiment.scene;
   run.placement = setup.placement;

@@ -19,15 +19,15 @@ struct ExperimentSetup {
   std::filesystem::path rig_file, scene_file;
   double thesis_stiffness_n_per_m{};
 };
-// `speeds_m_s` replaces the file's when it is not empty.
-[[nodiscard]] ExperimentSetup read_setup(const std::string& experiment, const std::vector<double>& speeds_m_s);
+// `speeds_m_s` and `hand` replace the file's when they are not empty.
+[[nodiscard]] ExperimentSetup read_setup(const std::string& experiment, const std::vector<double>& speeds_m_s, const std::string& hand);
 
 struct Progress {
   std::string phase;
   double fraction{};  // 0 … 1
   double remaining_s{};
   double depth_mm{};
-  double force_n{};
+  double force_n{};      // along the needle, of the virtual one in Haptic
   double tick_p99_us{};  // over the last second
   Mode mode{};
   std::uint64_t faults{};

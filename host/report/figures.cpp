@@ -8,6 +8,7 @@
 #include <map>
 
 #include "host/report/gnuplot.hpp"
+#include "host/report/haptic.hpp"
 
 namespace trocar::report {
 
@@ -202,6 +203,129 @@ std::string overview_script(const RunInfo& run, std::span<const Sample> samples)
              dark, palette[0], shade_keys(run), palette[3]);
 }
 
+// Of one display: along the needle, means in slices of time.
+struct Felt {
+  std::string name;
+  std::vector<Sample> samples;
+};
+
+std::vector<Felt> felt_displays(const RunInfo& run, std::span<const Sample> samples) {
+  std::vector<Felt> all;
+  for (const Phase& phase : run.phases) {
+    if (phase.kind != Phase::Kind::Haptic) continue;
+    Felt felt{phase.name, felt_samples(phase, samples)};
+    std::ranges::replace(felt.name, '\'', ' ');
+    if (felt.samples.size() > 1) all.push_back(std::move(felt));
+  }
+  return all;
+}
+
+template <class Value>
+std::string slice_means(const std::string& block, const Felt& felt, Value&& value) {
+  TimeSlices slices(felt.samples);
+  for (const Sample& s : felt.samples)
+    if (const double v = value(s); std::isfinite(v)) slices.add(s, v);
+  return slices.block(block, [](const TimeSlices::Slice& s) { return fmt::format("{:.5g}", s.sum / static_cast<double>(s.n)); });
+}
+
+// One panel below the other, one curve of force each for the hand, its estimate and the model.
+std::string felt_time_script(const RunInfo& run, const std::vector<Felt>& displays) {
+  if (displays.empty()) return {};
+  const auto n = static_cast<double>(displays.size());
+  const double top = 46.0, row = 210.0, bottom = 40.0, gap = 44.0;
+  const double height = top + n * row + bottom;
+  std::string blocks, panels;
+  for (std::size_t i = 0; i < displays.size(); ++i) {
+    const Felt& felt = displays[i];
+    std::size_t at = 0;  // truth and samples both go by increasing ticks
+    bool known = false;
+    blocks += slice_means(fmt::format("true{}", i), felt, [&](const Sample& s) {
+      while (at < run.truth.size() && run.truth[at].tick < s.tick) ++at;
+      if (at == run.truth.size() || run.truth[at].tick != s.tick) return not_measured;
+      known = true;
+      return along_needle(run, run.truth[at].hand_wrench);
+    });
+    blocks += slice_means(fmt::format("handle{}", i), felt, [&](const Sample& s) { return along_needle(run, s.handle_wrench); });
+    blocks += slice_means(fmt::format("model{}", i), felt, [&](const Sample& s) { return along_needle(run, s.virtual_wrench); });
+    const double upper = 1.0 - (top + static_cast<double>(i) * row) / height;
+    const double lower = 1.0 - (top + static_cast<double>(i + 1) * row - gap) / height;
+    panels += fmt::format(
+        "set tmargin at screen {:.5f}\nset bmargin at screen {:.5f}\nset label 1 '{}' at graph 0.01, graph 0.92 textcolor rgb '{}'\n"
+        "set xrange [{:.6g}:{:.6g}]\nset ylabel 'force [N]'\n{}{}plot ",
+        upper, lower, felt.name, dark, seconds(felt.samples.front()), seconds(felt.samples.back()),
+        i == 0 ? "set key at screen 0.535,0.985 center top horizontal Left reverse samplen 2 width -1\n" : "set nokey\n",
+        i + 1 == displays.size() ? "set xlabel 'time since the controller started [s]'\n" : "");
+    panels += fmt::format("$handle{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'hand, estimated', ", i, palette[5]);
+    if (known) panels += fmt::format("$true{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'hand, true', ", i, dark);
+    panels += fmt::format("$model{} using 1:2 with lines lw 1.5 lc rgb '{}' title 'model'\n", i, palette[3]);
+  }
+  return head("felt_time", 900, static_cast<int>(height)) + blocks +
+         fmt::format(
+             "set multiplot\nset lmargin at screen 0.08\nset rmargin at screen 0.98\nset xzeroaxis lc rgb '{}' lt 1 lw 1\n{}unset "
+             "multiplot\n",
+             dark, panels);
+}
+
+// Panels side by side, three in a row, on the same scales.
+std::string felt_depth_script(const RunInfo& run, const std::vector<Felt>& displays) {
+  if (displays.empty()) return {};
+  const std::size_t columns = std::min<std::size_t>(3, displays.size());
+  const std::size_t rows = (displays.size() + columns - 1) / columns;
+  double least = 0.0, most = 0.0, deepest = 0.0, highest = 0.0;
+  std::string blocks, panels;
+  for (std::size_t i = 0; i < displays.size(); ++i) {
+    TimeSlices depth(displays[i].samples), handle(displays[i].samples), model(displays[i].samples);
+    for (const Sample& s : displays[i].samples) {
+      const double d = 1e3 * virtual_depth_m(run, s), h = along_needle(run, s.handle_wrench), m = along_needle(run, s.virtual_wrench);
+      if (!std::isfinite(d + h + m)) continue;
+      depth.add(s, d);
+      handle.add(s, h);
+      model.add(s, m);
+    }
+    blocks += fmt::format("$depth{} << EOD\n", i);
+    for (std::size_t k = 0; k < TimeSlices::count; ++k) {
+      if (depth.slices[k].n == 0) continue;
+      const auto n = static_cast<double>(depth.slices[k].n);
+      const double d = depth.slices[k].sum / n, h = handle.slices[k].sum / n, m = model.slices[k].sum / n;
+      blocks += fmt::format("{:.5g} {:.5g} {:.5g}\n", d, h, m);
+      least = std::min({least, h, m});
+      most = std::max({most, h, m});
+      deepest = std::max(deepest, d);
+      highest = std::min(highest, d);
+    }
+    blocks += "EOD\n";
+    panels += fmt::format(
+        "set title '{1}'\n{2}plot $depth{0} using 1:2 with lines lw 1.5 lc rgb '{3}' title 'hand, estimated', "
+        "$depth{0} using 1:3 with lines lw 1.5 lc rgb '{4}' title 'model'\n",
+        i, displays[i].name, i % columns == 0 ? "set ylabel 'force along the needle [N]'\n" : "unset ylabel\n", palette[5], palette[3]);
+  }
+  const double margin = 0.05 * (most - least) + 1e-3;
+  const double height = 60.0 + 340.0 * static_cast<double>(rows);
+  return head("felt_depth", 900, static_cast<int>(height)) + blocks +
+         fmt::format(
+             "set multiplot layout {},{} margins screen 0.08, screen 0.98, screen {:.4f}, screen {:.4f} spacing screen 0.05, screen "
+             "{:.4f}\n"
+             "set xrange [{:.5g}:{:.5g}]\nset yrange [{:.5g}:{:.5g}]\nset key top left Left reverse samplen 1.5 width -1\n"
+             "set xlabel 'depth of the virtual tip [mm]'\nset xzeroaxis lc rgb '{}' lt 1 lw 1\n{}unset multiplot\n",
+             rows, columns, 80.0 / height, 1.0 - 40.0 / height, 110.0 / height, std::floor(highest - 1.0), std::ceil(deepest + 1.0),
+             least - margin, most + margin, dark, panels);
+}
+
+std::string display_energy_script(const std::vector<Felt>& displays) {
+  if (displays.empty()) return {};
+  std::string blocks, plots;
+  for (std::size_t i = 0; i < displays.size(); ++i) {
+    blocks += slice_means(fmt::format("energy{}", i), displays[i], [](const Sample& s) { return 1e3 * s.display_energy_j; });
+    plots += fmt::format("{}$energy{} using ($1-{:.6g}):2 with lines lw 2 lc rgb '{}' title '{}'", i == 0 ? "plot " : ", ", i,
+                         seconds(displays[i].samples.front()), palette[i % palette.size()], displays[i].name);
+  }
+  return head("display_energy", 900, 360) + blocks +
+         fmt::format(
+             "set xlabel 'time with the display [s]'\nset ylabel 'energy taken from the hand [mJ]'\nset autoscale xfixmax\n"
+             "set xzeroaxis lc rgb '{}' lt 1 lw 1\nset key outside top center horizontal Left reverse samplen 2\n{}\n",
+             dark, plots);
+}
+
 template <class Value>
 std::string histogram_script(const std::string& name, const std::string& what, std::span<const Sample> samples, const Distribution& d,
                              Value&& value) {
@@ -247,15 +371,31 @@ std::vector<Figure> draw_figures(const RunInfo& run, const Summary& summary, std
     script += part;
     figures.push_back(std::move(figure));
   };
-  add(force_depth_script(run, samples),
-      {"force_depth.svg", "Base force against depth",
-       "Solid: insertion. Dashed: withdrawal. Each point is the mean of a 0.25 mm slice of depth. Dotted: the shaft force density that the "
-       "thesis found at 1 mm/s, from zero at the surface."});
-  add(tracking_script(run, samples),
-      {"tracking.svg", "Tracking error",
-       "Distance between commanded and measured position of the needle's base, in slices of time; below 0.1 µm counts as 0.1 µm. The scale "
-       "is logarithmic."});
-  add(overview_script(run, samples), {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
+  if (run.kind == RunInfo::Kind::Haptic) {
+    const std::vector<Felt> displays = felt_displays(run, samples);
+    add(felt_time_script(run, displays),
+        {"felt_time.svg", "Force against time",
+         "Along the needle, means in slices of time. Hand: on the handle, as the controller estimated it, and as it was where a simulation "
+         "knows it. Model: what the virtual needle's base pushes with; at rest the hand pushes the same."});
+    add(felt_depth_script(run, displays),
+        {"felt_depth.svg", "Force against depth", "The same forces over the depth of the virtual tip: in above, out below."});
+    add(display_energy_script(displays),
+        {"display_energy.svg", "Energy of the display",
+         "The guard's account of what a display took from the hand less what it gave. It opens with a small credit, and no more is kept in "
+         "it "
+         "than a spring could give back at the present force; where it would fall below zero the guard damps."});
+  } else {
+    add(force_depth_script(run, samples), {"force_depth.svg", "Base force against depth",
+                                           "Solid: insertion. Dashed: withdrawal. Each point is the mean of a 0.25 mm slice of depth. "
+                                           "Dotted: the shaft force density that the "
+                                           "thesis found at 1 mm/s, from zero at the surface."});
+    add(tracking_script(run, samples), {"tracking.svg", "Tracking error",
+                                        "Distance between commanded and measured position of the needle's base, in slices of time; below "
+                                        "0.1 µm counts as 0.1 µm. The scale "
+                                        "is logarithmic."});
+    add(overview_script(run, samples),
+        {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
+  }
   add(histogram_script("tick_time", "execution time of the tick", samples, summary.tick_us,
                        [](const Sample& s) { return static_cast<double>(s.tick_us); }),
       {"tick_time.svg", "Tick time", "How long the controller computed in each tick. Both axes are logarithmic."});

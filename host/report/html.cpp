@@ -53,13 +53,13 @@ std::string millimetres(double metres, int digits = 3) { return number(1e3 * met
 std::string newtons(double n) { return number(n, 2, "N"); }
 std::string micrometres(double metres) { return number(1e6 * metres, 1, "µm"); }
 
-std::string row(std::initializer_list<std::string> cells) {
+std::string row(const std::vector<std::string>& cells) {
   std::string out = "<tr>";
   for (const std::string& cell : cells) out += "<td>" + cell + "</td>";
   return out + "</tr>\n";
 }
 
-std::string table(std::initializer_list<const char*> heads, const std::string& rows) {
+std::string table(const std::vector<const char*>& heads, const std::string& rows) {
   std::string out = "<div class=\"wide\"><table>\n<thead><tr>";
   for (const char* head : heads) out += fmt::format("<th>{}</th>", head);
   return out + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
@@ -118,6 +118,36 @@ std::string insertions_table(const RunInfo& run, const Summary& summary) {
   return table(
       {"Speed", "Gains", "Depth", "Slope", "At depth 0", "Force at full depth", "Strongest pull", "Error in (rms)", "Error out (rms)"},
       rows);
+}
+
+std::string displays_table(const RunInfo& run, const Summary& summary) {
+  if (summary.displays.empty()) return "<p class=\"none\">The run ended before the first display.</p>\n";
+  std::vector<const char*> heads{"Display",          "Time",         "Greatest depth", "Greatest model force", "Hand less model, rms",
+                                 "The same at rest", "Least energy", "Ticks unsolved", "Contacts, most"};
+  const bool known = !run.truth.empty();
+  if (known) heads.insert(heads.end(), {"True hand less model, rms", "Estimate less true hand, rms"});
+  std::string rows;
+  for (const HapticDisplay& d : summary.displays) {
+    std::vector<std::string> cells{escaped(d.name),
+                                   number(d.duration_s, 1, "s"),
+                                   millimetres(d.depth_m, 1),
+                                   newtons(d.force_n),
+                                   number(d.difference.rms_n, 3, "N"),
+                                   number(d.at_rest.rms_n, 3, "N"),
+                                   number(1e3 * d.least_energy_j, 2, "mJ"),
+                                   fmt::format("{} of {}", d.unsolved_ticks, d.ticks),
+                                   fmt::format("{}", d.most_contacts)};
+    if (known) {
+      const bool rises = std::isfinite(d.observer_rise_s);
+      cells.push_back(number(d.true_difference.rms_n, 3, "N"));
+      cells.push_back(number(d.observer.rms_n, 3, "N") + (rises ? ", rise " + number(1e3 * d.observer_rise_s, 0, "ms") : std::string()));
+    }
+    rows += row(cells);
+  }
+  return table(heads, rows) +
+         "<p class=\"sub\">Hand: its force on the handle, as the controller estimates it from encoders and motors, with the noise of that. "
+         "At "
+         "rest: where the handle goes slower than 5&nbsp;mm/s.</p>\n";
 }
 
 std::string tracking_table(const Summary& summary) {
@@ -194,11 +224,13 @@ figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; } figcaption 
 )";
 
 std::string page(const RunInfo& run, const Summary& summary, const std::vector<Figure>& figures, const fs::path& drawn) {
+  const bool haptic = run.kind == RunInfo::Kind::Haptic;
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n"
-      "<title>Needle insertion: {0}, {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<h1>Needle insertion</h1>\n"
+      "<title>{5}: {0}, {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<h1>{5}</h1>\n"
       "<p class=\"sub\">Rig {0}, scene {1}, gains {3}, {4}.</p>\n",
-      escaped(run.rig), escaped(run.scene), style, escaped(run.gains), run.lockstep ? "in lock-step on a virtual clock" : "in real time");
+      escaped(run.rig), escaped(run.scene), style, escaped(run.gains), run.lockstep ? "in lock-step on a virtual clock" : "in real time",
+      haptic ? "A virtual needle in the hand" : "Needle insertion");
   const auto figure = [&](const char* file) {
     for (const Figure& f : figures) {
       if (f.file != file) continue;
@@ -206,13 +238,18 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
                          inlined(drawn / f.file, fs::path(f.file).stem().string()), f.title, f.caption);
     }
   };
-  figure("force_depth.svg");
-  out += "<h2>Beside the thesis</h2>\n" + beside_thesis(run, summary);
-  out += "<h2>Insertions</h2>\n" + insertions_table(run, summary);
-  out += "<h2>Tracking</h2>\n" + tracking_table(summary);
-  figure("tracking.svg");
-  out += "<h2>Course of the run</h2>\n";
-  figure("overview.svg");
+  if (haptic) {
+    out += "<h2>Displays</h2>\n" + displays_table(run, summary);
+    for (const char* file : {"felt_time.svg", "felt_depth.svg", "display_energy.svg"}) figure(file);
+  } else {
+    figure("force_depth.svg");
+    out += "<h2>Beside the thesis</h2>\n" + beside_thesis(run, summary);
+    out += "<h2>Insertions</h2>\n" + insertions_table(run, summary);
+    out += "<h2>Tracking</h2>\n" + tracking_table(summary);
+    figure("tracking.svg");
+    out += "<h2>Course of the run</h2>\n";
+    figure("overview.svg");
+  }
   out += "<h2>Timing</h2>\n" + timing_table(run, summary);
   figure("tick_time.svg");
   figure("wakeup.svg");
@@ -222,10 +259,11 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
     for (const std::string& note : run.notes) out += "<li>" + escaped(note) + "</li>\n";
     out += "</ul>\n";
   }
-  return out +
-         "<p class=\"sub\">Every number of this run was computed from its samples (capture.mcap, samples.csv). Thesis: S. P. DiMaio, "
-         "Modelling, Simulation and Planning of Needle Motion in Soft Tissues, University of British Columbia, "
-         "2003.</p>\n</body>\n</html>\n";
+  return out + "<p class=\"sub\">Every number of this run was computed from its samples (capture.mcap, samples.csv)" +
+         (haptic ? (run.truth.empty() ? "." : " and what the simulation knew (truth.csv).")
+                 : ". Thesis: S. P. DiMaio, Modelling, Simulation and Planning of Needle Motion in Soft Tissues, University of British "
+                   "Columbia, 2003.") +
+         "</p>\n</body>\n</html>\n";
 }
 
 // A folder beside the results that goes away with what was not renamed out of it.

@@ -26,7 +26,8 @@ std::string text(std::string_view value) {
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }  // shortest that reads back
 
 // {"key": value, …} with values that are JSON already.
-std::string object(std::initializer_list<std::pair<const char*, std::string>> members) {
+using Members = std::vector<std::pair<const char*, std::string>>;
+std::string object(const Members& members) {
   std::string out = "{";
   for (const auto& [key, value] : members) out += fmt::format("{}\"{}\": {}", out.size() > 1 ? ", " : "", key, value);
   return out + "}";
@@ -68,6 +69,24 @@ std::string json(const Insertion& i) {
                  {"tracking_withdraw", json(i.withdraw)}});
 }
 
+std::string json(const Difference& d) { return object({{"ticks", std::to_string(d.ticks)}, {"rms_n", number(d.rms_n)}}); }
+
+std::string json(const HapticDisplay& d) {
+  return object({{"display", text(d.name)},
+                 {"ticks", std::to_string(d.ticks)},
+                 {"duration_s", number(d.duration_s)},
+                 {"depth_m", number(d.depth_m)},
+                 {"model_force_n", number(d.force_n)},
+                 {"handle_less_model", json(d.difference)},
+                 {"handle_less_model_at_rest", json(d.at_rest)},
+                 {"least_energy_j", number(d.least_energy_j)},
+                 {"unsolved_ticks", std::to_string(d.unsolved_ticks)},
+                 {"most_contacts", std::to_string(d.most_contacts)},
+                 {"observer_error", json(d.observer)},
+                 {"true_hand_less_model", json(d.true_difference)},
+                 {"observer_rise_s", number(d.observer_rise_s)}});
+}
+
 std::string json(const Sag& s) {
   return object({{"phase", text(s.phase)},
                  {"force_n", number(s.force_n)},
@@ -80,30 +99,35 @@ std::string json(const Sag& s) {
 }  // namespace
 
 std::string to_json(const RunInfo& run, const Summary& s) {
-  return object({{"folder", text(run.folder.string())},
-                 {"rig", text(run.rig)},
-                 {"scene", text(run.scene)},
-                 {"gains", text(run.gains)},
-                 {"lockstep", run.lockstep ? "true" : "false"},
-                 {"samples", std::to_string(s.samples)},
-                 {"duration_s", number(s.duration_s)},
-                 {"lost_ticks", std::to_string(s.lost_ticks)},
-                 {"gaps", std::to_string(s.gaps)},
-                 {"restarts", std::to_string(s.restarts)},
-                 {"ticks_without_feedback", std::to_string(s.ticks_without_feedback)},
-                 {"longest_without_feedback", std::to_string(s.longest_without_feedback)},
-                 {"faults", array(s.faults, [](const std::string& f) { return text(f); })},
-                 {"insertions", array(s.insertions, [](const Insertion& i) { return json(i); })},
-                 {"tracking", array(s.tracking,
-                                    [](const GainTracking& t) {
-                                      return object({{"gain_set", text(t.gain_set)}, {"air", json(t.air)}, {"phantom", json(t.phantom)}});
-                                    })},
-                 {"sags", array(s.sags, [](const Sag& sag) { return json(sag); })},
-                 {"step_m", number(s.step_m)},
-                 {"tick_us", json(s.tick_us)},
-                 {"wakeup_late_us", json(s.wakeup_late_us)},
-                 {"notes", array(run.notes, [](const std::string& n) { return text(n); })}}) +
-         "\n";
+  const bool haptic = run.kind == RunInfo::Kind::Haptic;
+  Members members{{"folder", text(run.folder.string())},
+                  {"kind", haptic ? "\"haptic\"" : "\"insertion\""},
+                  {"rig", text(run.rig)},
+                  {"scene", text(run.scene)},
+                  {"gains", text(run.gains)},
+                  {"lockstep", run.lockstep ? "true" : "false"},
+                  {"samples", std::to_string(s.samples)},
+                  {"duration_s", number(s.duration_s)},
+                  {"lost_ticks", std::to_string(s.lost_ticks)},
+                  {"gaps", std::to_string(s.gaps)},
+                  {"restarts", std::to_string(s.restarts)},
+                  {"ticks_without_feedback", std::to_string(s.ticks_without_feedback)},
+                  {"longest_without_feedback", std::to_string(s.longest_without_feedback)},
+                  {"faults", array(s.faults, [](const std::string& f) { return text(f); })}};
+  if (haptic) {
+    members.emplace_back("displays", array(s.displays, [](const HapticDisplay& d) { return json(d); }));
+  } else {
+    members.emplace_back("insertions", array(s.insertions, [](const Insertion& i) { return json(i); }));
+    members.emplace_back("tracking", array(s.tracking, [](const GainTracking& t) {
+                           return object({{"gain_set", text(t.gain_set)}, {"air", json(t.air)}, {"phantom", json(t.phantom)}});
+                         }));
+    members.emplace_back("sags", array(s.sags, [](const Sag& sag) { return json(sag); }));
+  }
+  members.emplace_back("step_m", number(s.step_m));
+  members.emplace_back("tick_us", json(s.tick_us));
+  members.emplace_back("wakeup_late_us", json(s.wakeup_late_us));
+  members.emplace_back("notes", array(run.notes, [](const std::string& n) { return text(n); }));
+  return object(members) + "\n";
 }
 
 }  // namespace trocar::report

@@ -4,8 +4,11 @@
 //   axial force    = base_wrench . n                           N, positive while inserting
 //   axial error    = (setpoint - pose) . n                     m, positive while lagging behind an insertion
 //   position error = |setpoint - pose| in the plane            m
+// A hand that feels a virtual needle: depth of the virtual tip, handle force (of the hand on the handle, as estimated) and model force (of
+// the virtual needle's base on the needle) alike from the sample's handle_*, virtual_*. At rest those two are equal.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -26,14 +29,20 @@ struct ReportError : std::runtime_error {
 
 struct Phase {
   std::string name;
-  enum class Kind { Air, Touch, Insert, Dwell, Withdraw, Other } kind = Kind::Other;
+  enum class Kind { Air, Touch, Insert, Dwell, Withdraw, Haptic, Other } kind = Kind::Other;
   double speed_m_s{};
   std::string gain_set;
   std::uint64_t first_tick{}, last_tick{};  // both included
 };
 
+struct Truth {  // what a simulation knows of a tick
+  std::uint64_t tick{};
+  std::array<double, 3> hand_wrench{};  // N, N, N m on the handle, rig frame
+};
+
 struct RunInfo {
   std::filesystem::path folder;
+  enum class Kind { Insertion, Haptic } kind = Kind::Insertion;
   std::string rig, scene, gains;  // names; `gains` is the set that the run used unless a phase says otherwise
   bool lockstep{};
   double surface_y_m{};
@@ -42,6 +51,7 @@ struct RunInfo {
   std::vector<Phase> phases;
   std::string sag_gain_set = "thesis";  // the set whose sag F/Kp is reported
   double kp_n_per_m{};                  // its proportional gain; 0: no sag is reported
+  std::vector<Truth> truth;             // increasing ticks; empty for a rig that is no lock-step simulation
   std::vector<std::string> notes;
 };
 
@@ -87,6 +97,27 @@ struct Sag {  // mean over the second half of a Dwell phase, or over the deepest
   double expected_command_m{};  // command_n / Kp
 };
 
+struct Difference {  // of two forces in the plane
+  std::uint64_t ticks{};
+  double rms_n = not_measured;
+};
+
+struct HapticDisplay {  // a Haptic phase: the ticks of it in which the mode is Haptic
+  std::string name;
+  std::uint64_t ticks{};
+  double duration_s{};
+  double depth_m = not_measured;         // greatest of the virtual tip
+  double force_n = not_measured;         // greatest of the model
+  Difference difference;                 // handle force less model force: what friction and inertia of the machine leave
+  Difference at_rest;                    // the same where the handle goes slower than 5 mm/s
+  double least_energy_j = not_measured;  // that the display has taken, less what it gave
+  std::uint64_t unsolved_ticks{};        // without a solution of the model
+  std::uint32_t most_contacts{};
+  Difference observer;                    // estimated handle force less the true one
+  Difference true_difference;             // true handle force less model force
+  double observer_rise_s = not_measured;  // 90 % of a step of the true force, where there is one (haptic.hpp)
+};
+
 struct Summary {
   std::uint64_t samples{}, lost_ticks{}, gaps{}, restarts{};
   double duration_s{};
@@ -95,12 +126,15 @@ struct Summary {
   std::vector<Insertion> insertions;
   std::vector<GainTracking> tracking;
   std::vector<Sag> sags;
+  std::vector<HapticDisplay> displays;
   double step_m = not_measured;          // median motion of the base when one encoder moves by one count
   Distribution tick_us, wakeup_late_us;  // empty in lock-step
 };
 
 [[nodiscard]] double tip_depth_m(const RunInfo& run, const Sample& sample) noexcept;
 [[nodiscard]] double axial_force_n(const RunInfo& run, const Sample& sample) noexcept;
+[[nodiscard]] double virtual_depth_m(const RunInfo& run, const Sample& sample) noexcept;
+[[nodiscard]] double along_needle(const RunInfo& run, const std::array<double, 3>& wrench) noexcept;
 
 // The samples of a phase. `samples` in increasing order of ticks.
 [[nodiscard]] std::span<const Sample> samples_of(const Phase& phase, std::span<const Sample> samples) noexcept;

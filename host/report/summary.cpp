@@ -2,6 +2,7 @@
 #include <cmath>
 #include <map>
 
+#include "host/report/haptic.hpp"
 #include "host/report/report.hpp"
 
 namespace trocar::report {
@@ -14,12 +15,12 @@ constexpr double deepest_m = 0.0005;
 constexpr double sag_window_m = 0.002;
 constexpr double slice_m = 0.001;
 
-double along(const RunInfo& run, const std::array<double, 3>& vector) noexcept {
-  return vector[0] * std::cos(run.needle_angle_rad) + vector[1] * std::sin(run.needle_angle_rad);
+double depth_of(const RunInfo& run, const std::array<double, 3>& pose) noexcept {
+  return (pose[1] + run.needle_length_m * std::sin(pose[2]) - run.surface_y_m) / std::sin(run.needle_angle_rad);
 }
 
 double axial_error_m(const RunInfo& run, const Sample& s) noexcept {
-  return along(run, {s.setpoint_pose[0] - s.pose[0], s.setpoint_pose[1] - s.pose[1], 0.0});
+  return along_needle(run, {s.setpoint_pose[0] - s.pose[0], s.setpoint_pose[1] - s.pose[1], 0.0});
 }
 
 class TrackingSum {
@@ -216,7 +217,7 @@ std::vector<Sag> sags_of(const RunInfo& run, std::span<const Sample> samples) {
     Sag sag;
     sag.phase = phase.name;
     sag.force_n = average([&](const Sample& s) { return axial_force_n(run, s); });
-    sag.command_n = average([&](const Sample& s) { return along(run, s.wrench_command); });
+    sag.command_n = average([&](const Sample& s) { return along_needle(run, s.wrench_command); });
     sag.error_m = average([&](const Sample& s) { return axial_error_m(run, s); });
     sag.expected_m = sag.force_n / run.kp_n_per_m;
     sag.expected_command_m = sag.command_n / run.kp_n_per_m;
@@ -227,11 +228,14 @@ std::vector<Sag> sags_of(const RunInfo& run, std::span<const Sample> samples) {
 
 }  // namespace
 
-double tip_depth_m(const RunInfo& run, const Sample& s) noexcept {
-  return (s.pose[1] + run.needle_length_m * std::sin(s.pose[2]) - run.surface_y_m) / std::sin(run.needle_angle_rad);
+double along_needle(const RunInfo& run, const std::array<double, 3>& vector) noexcept {
+  return vector[0] * std::cos(run.needle_angle_rad) + vector[1] * std::sin(run.needle_angle_rad);
 }
 
-double axial_force_n(const RunInfo& run, const Sample& s) noexcept { return along(run, s.base_wrench); }
+double tip_depth_m(const RunInfo& run, const Sample& s) noexcept { return depth_of(run, s.pose); }
+double virtual_depth_m(const RunInfo& run, const Sample& s) noexcept { return depth_of(run, s.virtual_pose); }
+
+double axial_force_n(const RunInfo& run, const Sample& s) noexcept { return along_needle(run, s.base_wrench); }
 
 std::span<const Sample> samples_of(const Phase& phase, std::span<const Sample> samples) noexcept {
   const auto first = std::ranges::lower_bound(samples, phase.first_tick, {}, &Sample::tick);
@@ -275,9 +279,13 @@ Summary summarise(const RunInfo& run, std::span<const Sample> all) {
   }
   summary.tick_us = distribution(std::move(tick_us));
   summary.wakeup_late_us = distribution(std::move(wakeup_us));
-  summary.insertions = insertions_of(run, samples);
-  summary.tracking = tracking_by_gains(run, samples);
-  summary.sags = sags_of(run, samples);
+  if (run.kind == RunInfo::Kind::Haptic) {
+    summary.displays = displays_of(run, samples);
+  } else {
+    summary.insertions = insertions_of(run, samples);
+    summary.tracking = tracking_by_gains(run, samples);
+    summary.sags = sags_of(run, samples);
+  }
   summary.step_m = median_step(samples);
   return summary;
 }

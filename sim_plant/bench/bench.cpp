@@ -9,7 +9,7 @@ constexpr std::size_t rig_port = 0;       // drives follow at 1 …
 
 }  // namespace
 
-Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed,
+Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed,
              virtual_needle::VirtualNeedle* needle)
     : rig_(rig),
       mail_(std::make_unique<controller::Mailboxes>()),
@@ -23,10 +23,6 @@ Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& 
 }
 
 void Bench::step_plant(std::int64_t now_ns) noexcept {
-  if (hand_ != nullptr) {
-    const Plant& machine = plant_.physics();
-    plant_.set_hand_wrench(hand_->advance(1e-9 * static_cast<double>(now_ns), machine.pose(), machine.velocity(), 1e-9 * step_ns));
-  }
   plant_.advance(now_ns);
   hal::CanFrame frame;
   for (std::size_t i = 0; i < WiredPlant::drives; ++i) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "common/rig/rig.hpp"
 #include "firmware/controller/controller.hpp"
@@ -17,12 +18,13 @@ namespace trocar::sim_plant {
 
 class Bench {
  public:
-  // scene: the tissue in front of the machine. needle: what the controller shows in Haptic; must outlive the bench, as the hand must.
-  Bench(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed,
+  // scene: the tissue in front of the machine, if any. needle: what the controller shows in Haptic; must outlive the bench, as the hand
+  // must.
+  Bench(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed,
         virtual_needle::VirtualNeedle* needle = nullptr);
 
   // From now on this hand holds the handle; nullptr: nobody.
-  void give_to(Hand* hand) noexcept { hand_ = hand; }
+  void give_to(Hand* hand) noexcept { plant_.give_to(hand); }
   // Drives get every command a tick later than they should.
   void delay_commands(bool late) noexcept { late_ = late; }
 
@@ -45,7 +47,6 @@ class Bench {
   hal::RigLink<hal::MemoryPort> link_;
   controller::Controller controller_;
   WiredPlant plant_;
-  Hand* hand_{nullptr};
   bool late_{false};
   hal::LinkCommand held_{};
   std::int64_t now_ns_{};

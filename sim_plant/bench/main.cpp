@@ -1,4 +1,5 @@
-// trocar-bench: a whole experiment in lock-step, without real time. Leaves samples.csv, capture.mcap and run.toml.
+// trocar-bench: a whole experiment in lock-step, without real time. Leaves samples.csv, capture.mcap and run.toml; of a haptic one also
+// truth.csv.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -7,19 +8,25 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/capture/rig_capture.hpp"
 #include "common/capture/samples_csv.hpp"
+#include "common/condense/compile.hpp"
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
 #include "common/experiment/experiment.hpp"
 #include "common/experiment/experiment_file.hpp"
+#include "common/experiment/truth_file.hpp"
+#include "common/model/image.hpp"
 #include "common/scene/scene.hpp"
 #include "common/wire/convert.hpp"
 #include "sim_plant/bench/bench.hpp"
+#include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 
 namespace {
@@ -31,6 +38,7 @@ void on_signal(int) { stop_asked.store(true); }
 
 struct Options {
   std::string experiment = "insertion";
+  std::string hand;
   std::vector<double> speeds_mm_s;
   std::filesystem::path out;
   std::uint64_t seed = 1;
@@ -41,19 +49,41 @@ constexpr std::uint64_t session = 1;
 constexpr std::size_t batch = 20;
 constexpr std::int64_t keep_alive_ns = 20'000'000;
 
+// The scene as the controller's model, in place of tissue.
+struct Model {
+  explicit Model(const scene::Scene& scene) {
+    condense::Options options;
+    options.visible = condense::WithVisible::No;
+    bytes = condense::compile_to_memory(scene, options).image;
+    const model::ImageStatus status = model::open(bytes.span(), image);
+    if (status != model::ImageStatus::Ok) throw config::UserError(scene.file.string() + ": " + to_string(status));
+    needle.offer(&image);
+  }
+  image_file::AlignedBytes bytes;
+  model::Image image{};
+  virtual_needle::VirtualNeedle needle;
+};
+
 int run(const Options& options) {
   experiment::Experiment e = experiment::read_experiment(config::find_share("experiments", options.experiment));
-  if (!options.speeds_mm_s.empty()) {
-    e.speeds_m_s.clear();
-    for (const double v : options.speeds_mm_s) e.speeds_m_s.push_back(1e-3 * v);
-  }
+  std::vector<double> speeds;
+  for (const double v : options.speeds_mm_s) speeds.push_back(1e-3 * v);
+  experiment::replace(e, speeds, options.hand);
   const rig::Rig rig = config::read_twin(config::find_share("rigs", e.rig));
   const scene::Scene scene = scene::read_scene(config::find_share("scenes", e.scene));
   scene::require_insertion(scene);
   const auto entry = scene::entry_m(scene);
   const experiment::Placement placement{entry[1], entry[0], scene.needle->length_m};
   experiment::Sequencer sequencer(e, placement, rig, session);
-  sim_plant::Bench bench(rig, sim_plant::read_plant(config::find_share("plants", e.plant)), scene, options.seed);
+  const sim_plant::PlantConfig plant = sim_plant::read_plant(config::find_share("plants", e.plant));
+  std::unique_ptr<Model> model;
+  std::optional<sim_plant::Hand> hand;
+  if (e.haptic()) {
+    hand = sim_plant::read_hand(config::find_share("hands", e.hand), options.seed);
+    model = std::make_unique<Model>(scene);
+  }
+  sim_plant::Bench bench(rig, plant, model ? std::nullopt : std::optional(scene), options.seed, model ? &model->needle : nullptr);
+  if (hand) bench.give_to(&*hand);
 
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
@@ -62,6 +92,8 @@ int run(const Options& options) {
         fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
   capture::RigCaptureWriter capture(options.out / "capture.mcap");
   capture::SamplesCsv csv(options.out / "samples.csv");
+  std::optional<experiment::TruthFile> truth_file;
+  if (hand) truth_file.emplace(options.out / "truth.csv");
 
   const auto begin = std::chrono::steady_clock::now();
   std::vector<Sample> pending;
@@ -81,7 +113,13 @@ int run(const Options& options) {
       bench.mail().commands.push({.session = session, .kind = CommandKind::KeepAlive});
       next_keep_alive_ns = bench.now_ns() + keep_alive_ns;
     }
+    experiment::Truth truth;
+    if (hand) truth = {0, bench.now_ns(), hand->wrench(), bench.plant().physics().pose()};
     bench.tick();
+    if (truth_file) {
+      truth.tick = bench.sample().tick;
+      truth_file->write(truth);
+    }
     const auto time_ns = static_cast<std::uint64_t>(bench.now_ns());
     csv.write(bench.sample());
     pending.push_back(bench.sample());
@@ -98,14 +136,16 @@ int run(const Options& options) {
     for (const Reply& r : replies) sequencer.on_reply(r);
     if (options.progress && ++ticks % 500 == 0 && std::isfinite(bench.sample().pose[1]))
       fmt::print(stderr, "progress {:.4f} {:.3f} {:.4f} {} {}\n", sequencer.progress(), 1e3 * sequencer.tip_depth_m(bench.sample()),
-                 bench.sample().base_wrench[1], to_string(bench.sample().mode), sequencer.phase_name());
+                 sequencer.axial_force_n(bench.sample()), to_string(bench.sample().mode), sequencer.phase_name());
   }
   write_pending();
   capture.close();
   csv.finish();
+  if (truth_file) truth_file->finish();
 
   experiment::Run result;
   result.experiment = e.name;
+  result.haptic = e.haptic();
   result.rig = rig.name.data();
   result.scene = e.scene;
   result.lockstep = true;
@@ -137,6 +177,7 @@ int main(int argc, char** argv) {
   app.add_option("--speeds", options.speeds_mm_s, "insertion speeds in mm/s instead of the file's, such as 1,9")
       ->delimiter(',')
       ->check(CLI::Range(0.01, 200.0));
+  app.add_option("--hand", options.hand, "who holds the handle, instead of the experiment's: hand name, or path of its TOML file");
   app.add_option("--out", options.out, "folder for the results")->required();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
   app.add_flag("--progress", options.progress, "progress for a parent program, on stderr");

@@ -23,8 +23,36 @@ HandConfig scaled(HandConfig hand, double factor) noexcept {
 
 Hand::Hand(const HandConfig& config, const Vector3& pose) : config_(config), random_(config.seed) { hold(pose); }
 
+Hand::Hand(const HandConfig& config, Habit habit)
+    : config_(config),
+      way_(habit.way),
+      recording_(std::move(habit.recording)),
+      recorded_arm_(habit.recorded_arm),
+      habit_(std::move(habit)),
+      random_(config.seed),
+      holds_(false) {}
+
 void Hand::want(std::vector<Intention> way) { way_ = std::move(way); }
-void Hand::replay(std::vector<RecordedWrench> recording) { recording_ = std::move(recording); }
+void Hand::replay(std::vector<RecordedWrench> recording, const RecordedArm& arm) {
+  recording_ = std::move(recording);
+  recorded_arm_ = arm;
+}
+
+void Hand::notice(bool motors_on, double time_s, const Vector3& pose) noexcept {
+  if (!habit_) return;
+  if (motors_on && !on_) on_since_s_ = time_s;
+  on_ = motors_on;
+  if (!on_) let_go();
+  if (!on_ || holds_ || time_s < on_since_s_ + habit_->take_after_s) return;
+  hold(pose);
+  begin_s_ = time_s;
+  period_s_ = habit_->period_s;
+  const double c = std::cos(pose[2]), s = std::sin(pose[2]);
+  for (std::size_t i = 0; i < way_.size(); ++i) {
+    const Vector3& to = habit_->way[i].pose;
+    way_[i].pose = {pose[0] + c * to[0] - s * to[1], pose[1] + s * to[0] + c * to[1], pose[2] + to[2]};
+  }
+}
 
 void Hand::hold(const Vector3& pose) noexcept {
   y_ = rest_ = pose;
@@ -36,7 +64,9 @@ void Hand::hold(const Vector3& pose) noexcept {
 
 Hand::Vector3 Hand::wanted(double time_s) const noexcept {
   if (way_.empty()) return rest_;
+  time_s -= begin_s_;
   if (time_s <= way_.front().time_s) return way_.front().pose;
+  if (period_s_ > 0.0) time_s = std::fmod(time_s, period_s_);
   const auto after = std::upper_bound(way_.begin(), way_.end(), time_s, [](double t, const Intention& i) { return t < i.time_s; });
   if (after == way_.end()) return way_.back().pose;
   const Intention& a = *(after - 1);
@@ -48,7 +78,8 @@ Hand::Vector3 Hand::wanted(double time_s) const noexcept {
   return pose;
 }
 
-Hand::Vector3 Hand::recorded(double time_s) const noexcept {
+Hand::Vector3 Hand::recorded(double time_s, const Vector3& pose, const Vector3& velocity) const noexcept {
+  time_s -= begin_s_;
   if (time_s < recording_.front().time_s || time_s > recording_.back().time_s) return {};
   const auto after =
       std::upper_bound(recording_.begin(), recording_.end(), time_s, [](double t, const RecordedWrench& r) { return t < r.time_s; });
@@ -57,7 +88,12 @@ Hand::Vector3 Hand::recorded(double time_s) const noexcept {
   const RecordedWrench& b = *after;
   const double part = (time_s - a.time_s) / (b.time_s - a.time_s);
   Vector3 wrench{};
-  for (std::size_t k = 0; k < 3; ++k) wrench[k] = std::lerp(a.wrench[k], b.wrench[k], part);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double stiffness = k < 2 ? recorded_arm_.stiffness : recorded_arm_.turn_stiffness;
+    const double damping = k < 2 ? recorded_arm_.damping : recorded_arm_.turn_damping;
+    wrench[k] = std::lerp(a.wrench[k], b.wrench[k], part) + stiffness * (std::lerp(a.pose[k], b.pose[k], part) - pose[k]) +
+                damping * ((b.pose[k] - a.pose[k]) / (b.time_s - a.time_s) - velocity[k]);
+  }
   return wrench;
 }
 
@@ -74,8 +110,8 @@ double Hand::tremble(std::size_t axis, double rms, double dt_s) noexcept {
 }
 
 const Hand::Vector3& Hand::advance(double time_s, const Vector3& pose, const Vector3& velocity, double dt_s) noexcept {
-  if (!recording_.empty()) return wrench_ = recorded(time_s);
   if (!holds_) return wrench_ = {};
+  if (!recording_.empty()) return wrench_ = recorded(time_s, pose, velocity);
   const Vector3 wanted_now = wanted(time_s);
   if (!started_) last_wanted_ = wanted_now;
   started_ = true;

@@ -7,17 +7,20 @@
 
 namespace trocar::sim_plant {
 
-Phantom::Phantom(const scene::Scene& scene) : insertion_(std::make_unique<insertion::Insertion>()) {
-  scene::require_insertion(scene);
+Phantom::Phantom(const std::optional<scene::Scene>& scene) {
+  if (!scene) return;
+  scene::require_insertion(*scene);
   condense::Options options;
   options.visible = condense::WithVisible::No;
-  bytes_ = condense::compile_to_memory(scene, options).image;
+  bytes_ = condense::compile_to_memory(*scene, options).image;
   const model::ImageStatus status = model::open(bytes_.span(), image_);
-  if (status != model::ImageStatus::Ok) throw config::UserError(scene.file.string() + ": " + to_string(status));
+  if (status != model::ImageStatus::Ok) throw config::UserError(scene->file.string() + ": " + to_string(status));
+  insertion_ = std::make_unique<insertion::Insertion>();
   insertion_->open(image_);
 }
 
 Phantom::Vector3 Phantom::advance(const Vector3& base_pose, double dt_s) noexcept {
+  if (empty()) return wrench_;
   using insertion::Status;
   const insertion::Result result = insertion_->step({base_pose[0], base_pose[1], base_pose[2]}, dt_s);
   ++counters_.steps;

@@ -53,7 +53,7 @@ TwinBodyConfig body_of(const rig::Rig& rig, const PlantConfig& plant) {
 
 }  // namespace
 
-Plant::Plant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed)
+Plant::Plant(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed)
     : actuation_(checked(rig).actuation),
       sensor_angle_rad_(rig.sensor.angle_rad),
       config_(checked(plant)),

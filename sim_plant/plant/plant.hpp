@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "common/rig/rig.hpp"
 #include "sim_plant/mechanism/twin_body.hpp"
@@ -20,9 +21,9 @@ namespace trocar::sim_plant {
 
 class Plant {
  public:
-  // Throws std::invalid_argument (fem::Error for the scene): a rig that is no twin, values out of range, a homing pose that the
-  // true mechanism cannot take.
-  Plant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed);
+  // Without a scene nothing stands in front of the machine. Throws std::invalid_argument (fem::Error for the scene): a rig that is no twin,
+  // values out of range, a homing pose that the true mechanism cannot take.
+  Plant(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed);
 
   // Integrates all whole steps that end at or before time_ns with this torque command at the motors, in front of their gears.
   // NaN and infinity count as no torque. Time does not run backwards: an earlier time_ns does nothing.
@@ -32,6 +33,7 @@ class Plant {
   void set_hand_wrench(const std::array<double, 3>& wrench) noexcept;
 
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
+  [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
   [[nodiscard]] const std::array<double, 4>& joint_angle_rad() const noexcept { return joint_angle_rad_; }  // not wrapped
   // As the drives know it: motor torque times ratio and the rig's nominal efficiency.
   [[nodiscard]] std::array<double, 4> joint_torque_nm() const noexcept;

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/config/rig_file.hpp"
@@ -17,6 +18,7 @@
 #include "common/scene/scene.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
+#include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 #include "sim_plant/wired/wired_plant.hpp"
 
@@ -31,7 +33,9 @@ void on_signal(int) { stop_asked.store(true); }
 struct Options {
   std::string rig = "ubc_twin";
   std::string scene = "phantom";
+  bool no_tissue{};
   std::string plant = "ubc_twin";
+  std::string hand;
   std::uint64_t seed = 1;
   bool log_drives{};
 };
@@ -44,7 +48,10 @@ int run(const Options& options) {
   const auto rig_file = config::find_share("rigs", options.rig);
   const rig::Rig rig = config::read_twin(rig_file);
   const auto plant_config = sim_plant::read_plant(config::find_share("plants", options.plant));
-  const scene::Scene scene = scene::read_scene(config::find_share("scenes", options.scene));
+  std::optional<scene::Scene> scene;
+  if (!options.no_tissue) scene = scene::read_scene(config::find_share("scenes", options.scene));
+  std::optional<sim_plant::Hand> hand;
+  if (!options.hand.empty()) hand = sim_plant::read_hand(config::find_share("hands", options.hand), options.seed);
   hal::EndpointBus drives;
   hal::EndpointBus sensor;
   const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
@@ -54,7 +61,9 @@ int run(const Options& options) {
   open(drives, rig.buses.drives, "drives");
   open(sensor, rig.buses.sensor, "sensor");
   auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, scene, options.seed);
-  fmt::print("trocar-plant: {} before scene {}, seed {}\n", rig.name.data(), options.scene, options.seed);
+  if (hand) plant->give_to(&*hand);
+  fmt::print("trocar-plant: {} before {}{}, seed {}\n", rig.name.data(), scene ? "scene " + options.scene : "no tissue",
+             hand ? ", with hand " + options.hand : "", options.seed);
   std::fflush(stdout);
 
   const std::array<int, 2> inputs{drives.file_descriptor(), sensor.file_descriptor()};
@@ -92,8 +101,9 @@ int run(const Options& options) {
     }
   }
   const auto& p = plant->physics();
-  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times; phantom: {} steps, {} unconverged\n",
-             1e-9 * static_cast<double>(p.time_ns()), starved, p.phantom().counters().steps, p.phantom().counters().unconverged);
+  fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times", 1e-9 * static_cast<double>(p.time_ns()), starved);
+  if (scene) fmt::print("; phantom: {} steps, {} unconverged", p.phantom().counters().steps, p.phantom().counters().unconverged);
+  fmt::print("\n");
   return 0;
 }
 
@@ -102,9 +112,14 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   Options options;
   bool die_with_parent = false;
-  CLI::App app{"trocar-plant: a simulated rig and tissue on the rig's buses.\nExample: trocar-plant --rig ubc_twin --scene phantom"};
+  CLI::App app{
+      "trocar-plant: a simulated rig and tissue on the rig's buses.\nExample: trocar-plant --rig ubc_twin --scene phantom\nA virtual "
+      "needle: trocar-plant --rig "
+      "ubc_twin_haptic --plant ubc_twin_haptic --no-tissue --hand person"};
   app.add_option("--rig", options.rig, "rig name, or path of its TOML file")->capture_default_str();
-  app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
+  auto* scene = app.add_option("--scene", options.scene, "scene name, or path of its TOML file")->capture_default_str();
+  app.add_flag("--no-tissue", options.no_tissue, "nothing in front of the machine, as for a virtual needle")->excludes(scene);
+  app.add_option("--hand", options.hand, "who takes the handle when the motors come on: hand name, or path of its TOML file");
   app.add_option("--plant", options.plant, "plant name (how the machine differs from its rig file), or path")->capture_default_str();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
   app.add_flag("--log-drives", options.log_drives,

@@ -1,13 +1,17 @@
-// The simulated machine with its electronics: physics, drives and force sensor. Frames in, frames out; time is the caller's.
+// The simulated machine with its electronics: physics, drives and force sensor, and the hand at its handle. Frames in, frames out; time is
+// the caller's.
 // Order of a step: advance(now), receive every frame that has arrived, then transmit until empty.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/rig/rig.hpp"
 #include "hal/can/frame.hpp"
+#include "sim_plant/hand/hand.hpp"
 #include "sim_plant/nodes/drive_node.hpp"
 #include "sim_plant/nodes/sensor_node.hpp"
 #include "sim_plant/plant/plant.hpp"
@@ -16,7 +20,7 @@ namespace trocar::sim_plant {
 
 class WiredPlant {
  public:
-  WiredPlant(const rig::Rig& rig, const PlantConfig& plant, const scene::Scene& scene, std::uint64_t seed)
+  WiredPlant(const rig::Rig& rig, const PlantConfig& plant, const std::optional<scene::Scene>& scene, std::uint64_t seed)
       : physics_(rig, plant, scene, seed), sensor_(make_sensor_config(rig)) {
     // Incremental encoders read anything at power-on; homing has to find out.
     Random offsets(seed);
@@ -30,6 +34,13 @@ class WiredPlant {
   void advance(std::int64_t now_ns) noexcept {
     std::array<double, drives> torque{};
     for (std::size_t i = 0; i < drives; ++i) torque[i] = drive_[i].motor_torque_nm();
+    // The hand goes with the handle step by step: held over a longer one, its grip would feed energy in.
+    for (std::int64_t t = physics_.time_ns() + physics_.step_ns(); hand_ != nullptr && t <= now_ns; t += physics_.step_ns()) {
+      hand_->notice(motors_on(), 1e-9 * static_cast<double>(t), physics_.pose());
+      physics_.set_hand_wrench(hand_->advance(1e-9 * static_cast<double>(t), physics_.pose(), physics_.velocity(),
+                                              1e-9 * static_cast<double>(physics_.step_ns())));
+      physics_.advance_to(t, torque);
+    }
     physics_.advance_to(now_ns, torque);
     set_shafts();
     for (auto& drive : drive_) drive.advance(now_ns);
@@ -39,7 +50,14 @@ class WiredPlant {
   bool drive_transmits(std::size_t drive, hal::CanFrame& frame) noexcept { return drive_[drive].transmit(frame); }
   bool sensor_transmits(hal::CanFrame& frame) noexcept { return sensor_.transmit(frame); }
 
-  void set_hand_wrench(const std::array<double, 3>& wrench) noexcept { physics_.set_hand_wrench(wrench); }
+  // From now on this hand may hold the handle; it has to outlive the plant. nullptr: nobody.
+  void give_to(Hand* hand) noexcept {
+    hand_ = hand;
+    if (hand == nullptr) physics_.set_hand_wrench({});
+  }
+  [[nodiscard]] bool motors_on() const noexcept {
+    return std::ranges::all_of(drive_, [](const DriveNode& d) { return d.state() == hal::canopen::DriveState::OperationEnabled; });
+  }
 
   [[nodiscard]] const Plant& physics() const noexcept { return physics_; }
   [[nodiscard]] const DriveNode& drive(std::size_t i) const noexcept { return drive_[i]; }
@@ -54,6 +72,7 @@ class WiredPlant {
   Plant physics_;
   std::vector<DriveNode> drive_;
   SensorNode sensor_;
+  Hand* hand_{nullptr};
 };
 
 }  // namespace trocar::sim_plant

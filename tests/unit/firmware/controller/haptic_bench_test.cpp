@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/condense/compile.hpp"
@@ -35,15 +36,12 @@ class Haptics {
     rig_.actuation.encoder_counts_per_turn = encoder_counts;
     if (encoder_counts < 16000) rig_.haptic.observer_bandwidth_rad_s = 220.0;  // as much as 4,000 counts are admitted with
     if (control::admit(rig_).verdict != control::Admissible::Yes) throw std::runtime_error("the observer is not admitted");
-    // Nothing stands in front of the machine itself.
-    scene::Scene air = scene_;
-    for (double& y : air.tissue.grid->axis_m[1]) y += 1.0;
     condense::Options options;
     options.visible = condense::WithVisible::No;
     bytes_ = condense::compile_to_memory(scene_, options).image;
     if (model::open(bytes_.span(), image_) != model::ImageStatus::Ok) throw std::runtime_error("the image cannot be opened");
     needle_.offer(&image_);
-    bench_ = std::make_unique<Bench>(rig_, read_plant(share_ / "plants/ubc_twin_haptic.toml"), air, 1, &needle_);
+    bench_ = std::make_unique<Bench>(rig_, read_plant(share_ / "plants/ubc_twin_haptic.toml"), std::nullopt, 1, &needle_);
   }
 
   void tick(int n) {

@@ -1,6 +1,7 @@
 // A run whose every number is known by construction: forces are straight lines in depth, errors are constants.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -100,6 +101,61 @@ inline Run make(const Truth& truth = {}, double angle_rad = std::numbers::pi / 2
   maker.phase("thesis insert", Kind::Insert, 0.005, "thesis", 0.0, truth.depth_m, 0, truth.slope_n_per_m, Law::Insert, sag);
   maker.phase("thesis dwell", Kind::Dwell, 0, "thesis", truth.depth_m, truth.depth_m, 1.0, truth.slope_n_per_m, Law::Insert, sag);
   return std::move(maker.run);
+}
+
+// A hand that feels a virtual needle, two seconds with each of two displays: in and out on a triangle of depth, a model force of so much
+// per metre, an estimate that is off by a constant, and in the second display a step of the hand's force that the estimate follows with a
+// lag.
+struct HapticTruth {
+  double depth_m = 0.040, stiffness_n_per_m = 50.0;
+  double friction_n = 0.3;        // true hand force less model force
+  double estimate_error_n = 0.1;  // estimated less true hand force
+  double step_n = 2.0;
+  int rise_ticks = 12;  // the estimate goes through 90 % of the step so long after it
+};
+
+inline Run make_haptic(const HapticTruth& truth = {}) {
+  using trocar::Sample;
+  Run run;
+  run.info.kind = trocar::report::RunInfo::Kind::Haptic;
+  run.info.rig = "ubc_twin_haptic";
+  run.info.scene = "phantom";
+  run.info.gains = "default";
+  run.info.surface_y_m = 0.20;
+  run.info.needle_length_m = 0.10;
+  std::uint64_t tick = 100;
+  for (const char* display : {"impedance", "admittance"}) {
+    const bool steps = std::string(display) == "admittance";
+    const std::uint64_t first = tick;
+    for (int i = -5; i < 2000; ++i, ++tick) {
+      Sample s;
+      s.tick = tick;
+      s.time_ns = static_cast<std::int64_t>(tick) * 1'000'000;
+      s.mode = i < 0 ? trocar::Mode::Armed : trocar::Mode::Haptic;  // the phase begins a little before the mode
+      s.tick_us = 10.0f;
+      s.wakeup_late_us = 20.0f;
+      const double depth = truth.depth_m * (1.0 - std::abs(static_cast<double>(i) / 1000.0 - 1.0));
+      s.virtual_pose = {0.0, 0.10 + depth, std::numbers::pi / 2};
+      s.pose = s.virtual_pose;
+      s.velocity = {0.0, i < 500 ? 0.04 : 0.0, 0.0};
+      s.virtual_wrench = {0.0, truth.stiffness_n_per_m * depth, 0.0};
+      double hand = s.virtual_wrench[1] + truth.friction_n, estimate = hand + truth.estimate_error_n;
+      if (steps) {  // nothing but the step
+        s.virtual_wrench = {};
+        hand = i >= 1000 ? truth.step_n : 0.0;
+        const double part = std::clamp(static_cast<double>(i - 999) / truth.rise_ticks * 0.9, 0.0, 1.0);
+        estimate = part * truth.step_n;
+      }
+      s.handle_wrench = {0.0, estimate, 0.0};
+      s.display_energy_j = 0.001 * std::cos(0.01 * i);
+      s.virtual_contacts = static_cast<std::uint32_t>(depth / 0.005);
+      s.virtual_status = i == 7 ? 7 : i == 8 ? 4 : 0;  // NotConverged has no solution, TipLost has one
+      run.samples.push_back(s);
+      run.info.truth.push_back({tick, {0.0, hand, 0.0}});
+    }
+    run.info.phases.push_back({display, trocar::report::Phase::Kind::Haptic, 0.0, "default", first, tick - 1});
+  }
+  return run;
 }
 
 }  // namespace made_up

@@ -88,6 +88,40 @@ TEST_F(ReportTest, LockstepRunHasNoTimesAndNoHistograms) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "figures/force_depth.svg"));
 }
 
+TEST_F(ReportTest, HapticRunShowsItsDisplaysAndNoInsertions) {
+  auto run = made_up::make_haptic();
+  run.info.folder = folder_;
+  write_report(run.info, summarise(run.info, run.samples), run.samples);
+  const std::string page = slurp(folder_ / "report.html");
+  for (const char* text : {"A virtual needle in the hand", "impedance", "admittance", "40.0&nbsp;mm", "2.00&nbsp;N", "0.400&nbsp;N",
+                           "0.100&nbsp;N", "rise 12&nbsp;ms", "1 of 2000", "-1.00&nbsp;mJ", "hand, true"})
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  for (const char* text : {"Needle insertion", "Insertions", "Beside the thesis", "Tracking", "Thesis:"})
+    EXPECT_EQ(page.find(text), std::string::npos) << text;
+  for (const char* figure : {"felt_time.svg", "felt_depth.svg", "display_energy.svg", "tick_time.svg", "wakeup.svg"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "figures" / figure)) << figure;
+  EXPECT_EQ(entries(folder_ / "figures"), 5u);
+}
+
+TEST_F(ReportTest, HapticRunOfARealRigHasNoTruthToShow) {
+  auto run = made_up::make_haptic();
+  run.info.folder = folder_;
+  run.info.truth.clear();
+  write_report(run.info, summarise(run.info, run.samples), run.samples);
+  const std::string page = slurp(folder_ / "report.html");
+  for (const char* text : {"Estimate less true hand", "hand, true", "truth.csv"}) EXPECT_EQ(page.find(text), std::string::npos) << text;
+  EXPECT_NE(page.find("hand, estimated"), std::string::npos);
+}
+
+TEST_F(ReportTest, HapticRunThatNeverGotThereSaysSo) {
+  auto run = made_up::make_haptic();
+  run.info.folder = folder_;
+  run.info.phases.clear();
+  write_report(run.info, summarise(run.info, run.samples), run.samples);
+  EXPECT_NE(slurp(folder_ / "report.html").find("ended before the first display"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "figures/felt_time.svg"));
+}
+
 TEST_F(ReportTest, EmptyRunStillGetsAPageThatSaysSo) {
   RunInfo info;
   info.folder = folder_;
@@ -119,6 +153,19 @@ TEST_F(ReportTest, MissingGnuplotAndUnwritableFolderAreOneSentenceWithARemedy) {
   } catch (const ReportError& error) {
     EXPECT_NE(std::string_view(error.what()).find("missing"), std::string_view::npos) << error.what();
   }
+}
+
+TEST(Json, HoldsOnlyWhatTheKindHas) {
+  const auto haptic = made_up::make_haptic();
+  const std::string felt = to_json(haptic.info, summarise(haptic.info, haptic.samples));
+  for (const char* text : {"\"kind\": \"haptic\"", "\"display\": \"impedance\"", "\"unsolved_ticks\": 1", "\"observer_rise_s\": null",
+                           "\"observer_rise_s\": 0.012"})
+    EXPECT_NE(felt.find(text), std::string::npos) << text << felt;
+  EXPECT_EQ(felt.find("\"insertions\""), std::string::npos);
+  const auto insertion = made_up::make();
+  const std::string inserted = to_json(insertion.info, summarise(insertion.info, insertion.samples));
+  EXPECT_NE(inserted.find("\"kind\": \"insertion\""), std::string::npos);
+  EXPECT_EQ(inserted.find("\"displays\""), std::string::npos);
 }
 
 TEST(Json, HoldsTheNumbersAndNullForWhatWasNotMeasured) {

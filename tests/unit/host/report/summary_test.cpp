@@ -150,6 +150,41 @@ TEST(Summary, StepIsTheMotionOfOneCount) {
   EXPECT_NEAR(summarise(run.info, run.samples).step_m, 30e-6, 1e-12);
 }
 
+TEST(Summary, FindsWhatTheHandFelt) {
+  const made_up::HapticTruth truth;
+  const auto run = made_up::make_haptic(truth);
+  const Summary s = summarise(run.info, run.samples);
+  EXPECT_TRUE(s.insertions.empty());
+  EXPECT_TRUE(s.tracking.empty());
+  ASSERT_EQ(s.displays.size(), 2u);
+  const HapticDisplay& d = s.displays[0];
+  EXPECT_EQ(d.name, "impedance");
+  EXPECT_EQ(d.ticks, 2000u) << "without those before the mode was Haptic";
+  EXPECT_NEAR(d.duration_s, 1.999, 1e-12);
+  EXPECT_NEAR(d.depth_m, truth.depth_m, 1e-12);
+  EXPECT_NEAR(d.force_n, truth.stiffness_n_per_m * truth.depth_m, 1e-12);
+  EXPECT_NEAR(d.difference.rms_n, truth.friction_n + truth.estimate_error_n, 1e-12);
+  EXPECT_EQ(d.at_rest.ticks, 1500u);
+  EXPECT_NEAR(d.least_energy_j, -0.001, 1e-7);
+  EXPECT_EQ(d.unsolved_ticks, 1u);
+  EXPECT_EQ(d.most_contacts, 8u);
+  EXPECT_EQ(d.observer.ticks, 2000u);
+  EXPECT_NEAR(d.observer.rms_n, truth.estimate_error_n, 1e-12);
+  EXPECT_NEAR(d.true_difference.rms_n, truth.friction_n, 1e-12);
+  EXPECT_TRUE(std::isnan(d.observer_rise_s)) << "a hand that pushes smoothly has no step";
+  EXPECT_NEAR(s.displays[1].observer_rise_s, 1e-3 * truth.rise_ticks, 1e-12);
+}
+
+TEST(Summary, KnowsNoObserverErrorWithoutTruth) {
+  auto run = made_up::make_haptic();
+  run.info.truth.clear();
+  const Summary s = summarise(run.info, run.samples);
+  EXPECT_EQ(s.displays[1].observer.ticks, 0u);
+  EXPECT_TRUE(std::isnan(s.displays[1].observer.rms_n));
+  EXPECT_TRUE(std::isnan(s.displays[1].observer_rise_s));
+  EXPECT_FALSE(std::isnan(s.displays[1].difference.rms_n));
+}
+
 TEST(Summary, EmptyRecordingGivesNoNumbersAndNoCrash) {
   RunInfo info;
   info.phases.push_back({"insert", Phase::Kind::Insert, 0.001, "default", 0, 100});

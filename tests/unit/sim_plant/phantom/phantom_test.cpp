@@ -320,5 +320,13 @@ TEST(Phantom, NamesWhatIsWrongWithAScene) {
   EXPECT_NE(refusal(bad).find("needle"), std::string::npos);
 }
 
+TEST(Phantom, WithoutASceneThereIsNothing) {
+  Phantom phantom{std::nullopt};
+  EXPECT_TRUE(phantom.empty());
+  for (int k = 0; k < 100; ++k) EXPECT_EQ(phantom.advance({0.0, 0.10 + 1e-3 * k, std::numbers::pi / 2}, 1e-3), Phantom::Vector3{});
+  EXPECT_EQ(phantom.contacts(), 0u);
+  EXPECT_EQ(phantom.counters().steps, 0u);
+}
+
 }  // namespace
 }  // namespace trocar::sim_plant

@@ -233,6 +233,21 @@ TEST(Plant, SurvivesFullTorqueInEveryDirection) {
   for (const double x : m.plant.pose()) EXPECT_TRUE(std::isfinite(x));
 }
 
+// Two seconds of the same push, with tissue in the way and without.
+TEST(Plant, NothingHoldsTheNeedleWithoutTissue) {
+  const auto pushed = [](const std::optional<scene::Scene>& scene) {
+    Plant plant(shipped_rig(), shipped_plant(), scene, 1);
+    plant.set_hand_wrench({0.0, 1.5, 0.0});
+    plant.advance_to(2000 * millisecond, {});
+    return std::pair{plant.pose()[1], plant.base_wrench()};
+  };
+  const auto [free_m, nothing] = pushed(std::nullopt);
+  const auto [held_m, tissue] = pushed(shipped_scene());
+  EXPECT_GT(free_m, held_m + 0.01);
+  EXPECT_EQ(nothing, (std::array<double, 3>{}));
+  EXPECT_GT(tissue[1], 0.1);
+}
+
 std::string refusal(const rig::Rig& rig, const PlantConfig& config) {
   try {
     const Plant plant(rig, config, shipped_scene(), 1);
