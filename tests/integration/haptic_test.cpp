@@ -20,15 +20,7 @@ constexpr double demo_s = 60.0;
 // Two displays, 1.4 s each, for a person who is quick about it.
 struct Quick {
   explicit Quick(const Scratch& scratch, const std::string& displays = R"(["impedance", "admittance"])") : hand(scratch / "hand.toml") {
-    const auto ports = free_udp_ports(4);
-    write_text(scratch / "rig.toml", shared_file("rigs/ubc_twin_haptic.toml",
-                                                 {{"rig_port = 20011", "rig_port = " + std::to_string(ports[0])},
-                                                  {"plant_port = 20010", "plant_port = " + std::to_string(ports[1])},
-                                                  {"rig_port = 20013", "rig_port = " + std::to_string(ports[2])},
-                                                  {"plant_port = 20012", "plant_port = " + std::to_string(ports[3])},
-                                                  // A shared machine may starve controller and plant for longer; that is not tested here.
-                                                  {"late_tick_best_effort_us = 50000", "late_tick_best_effort_us = 1000000"},
-                                                  {"missed_feedback_ticks = 20", "missed_feedback_ticks = 1000"}}));
+    scratch.make_rig({{"missed_feedback_ticks = 20", "missed_feedback_ticks = 1000"}}, "ubc_twin_haptic");
     write_text(hand, shared_file("hands/person.toml", {{"take_after_s = 0.5", "take_after_s = 0.1"},
                                                        {"forward_m = 0.075", "forward_m = 0.03"},
                                                        {"push_speed_m_s = 0.025", "push_speed_m_s = 0.06"},
@@ -151,7 +143,7 @@ TEST(Haptic, ACompiledSceneIsFeltUntilCtrlC) {
   const auto image = scratch / "phantom.image";
   Program compile(scratch, "trocar", {"scene", "compile", "phantom", "--out", image.string()});
   ASSERT_EQ(compile.wait(answer_s), 0) << compile.errors();
-  const std::string rig_file = scratch.make_rig().string();
+  const std::string rig_file = scratch.make_rig({}, "ubc_twin_haptic").string();
   Program plant(scratch, "trocar-plant", {"--rig", rig_file});
   ASSERT_TRUE(plant.wait_for("before scene", answer_s)) << plant.errors();
   Program rig(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort", "--model", image.string()});
@@ -168,6 +160,15 @@ TEST(Haptic, ACompiledSceneIsFeltUntilCtrlC) {
   ASSERT_EQ(seen.mode, Mode::Haptic) << to_string(seen.fault);
   EXPECT_TRUE(std::isfinite(seen.handle_wrench[1]));
   EXPECT_NEAR(seen.virtual_pose[0], seen.pose[0], 0.02);
+
+  // Another model while it is felt; then a damaged one, which is refused.
+  Program other(scratch, "trocar", {"scene", "compile", "layered", "--out", image.string()});
+  ASSERT_EQ(other.wait(answer_s), 0) << other.errors();
+  EXPECT_TRUE(rig.wait_for("model " + image.string() + " taken", answer_s)) << rig.errors();
+  write_text(image, "this is no image");
+  EXPECT_TRUE(rig.wait_for("the model that runs stays", answer_s)) << rig.errors();
+  for (int i = 0; i < 20; ++i) client.poll(0.01, {.sample = [&](const Sample& s) { seen = s; }});
+  EXPECT_EQ(seen.mode, Mode::Haptic) << to_string(seen.fault);
   feel.signal(SIGINT);
   EXPECT_EQ(feel.wait(answer_s), 0) << feel.errors();
 }
@@ -175,7 +176,7 @@ TEST(Haptic, ACompiledSceneIsFeltUntilCtrlC) {
 TEST(Haptic, IsRefusedWithoutAModelAndWithADamagedOne) {
   const Scratch scratch;
   const std::string domain = std::to_string(own_domain());
-  const std::string rig_file = scratch.make_rig().string();
+  const std::string rig_file = scratch.make_rig({}, "ubc_twin_haptic").string();
   const auto damaged = scratch / "damaged.image";
   std::ofstream(damaged) << "this is no image";
   expect_refusal(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort", "--model", damaged.string()},

@@ -98,16 +98,21 @@ Scratch::~Scratch() {
   std::filesystem::remove_all(folder_, ignored);
 }
 
-std::filesystem::path Scratch::make_rig(const Edits& edits) const {
+std::filesystem::path Scratch::make_rig(const Edits& edits, const std::string& name) const {
   const auto ports = free_udp_ports(4);
-  Edits all{{"rig_port = 20001", "rig_port = " + std::to_string(ports[0])},
-            {"plant_port = 20000", "plant_port = " + std::to_string(ports[1])},
-            {"rig_port = 20003", "rig_port = " + std::to_string(ports[2])},
-            {"plant_port = 20002", "plant_port = " + std::to_string(ports[3])},
-            // A shared machine may starve the controller for longer; what is tested here is not that.
+  const int first = name == "ubc_twin_haptic" ? 20010 : 20000;  // of the shipped file
+  const auto other = [&](const char* key, int port, std::size_t by) {
+    const std::string is = std::string(key) + " = ";
+    return Edits::value_type{is + std::to_string(port), is + std::to_string(ports[by])};
+  };
+  Edits all{other("rig_port", first + 1, 0),
+            other("plant_port", first, 1),
+            other("rig_port", first + 3, 2),
+            other("plant_port", first + 2, 3),
+            // A shared machine may starve controller and plant for longer; what is tested here is not that.
             {"late_tick_best_effort_us = 50000", "late_tick_best_effort_us = 1000000"}};
   all.insert(all.end(), edits.begin(), edits.end());
-  write_text(folder_ / "rig.toml", shared_file("rigs/ubc_twin.toml", all));
+  write_text(folder_ / "rig.toml", shared_file("rigs/" + name + ".toml", all));
   return folder_ / "rig.toml";
 }
 

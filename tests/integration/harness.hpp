@@ -37,7 +37,7 @@ class Scratch {
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
   // ubc_twin on four free ports, in the file rig.toml of this folder.
-  std::filesystem::path make_rig(const Edits& edits = {}) const;
+  std::filesystem::path make_rig(const Edits& edits = {}, const std::string& name = "ubc_twin") const;
   // The insertion experiment with this folder's rig.toml and a short stroke, in experiment.toml.
   std::filesystem::path make_experiment(const Edits& edits = {}) const;
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "common/config/rig_file.hpp"
@@ -14,14 +15,16 @@
 
 namespace trocar::controller {
 
-inline rig::Rig shipped_rig() { return config::read_rig(std::filesystem::path(TROCAR_SHARE) / "rigs/ubc_twin.toml"); }
+inline rig::Rig shipped_rig(const std::string& name) {
+  return config::read_rig(std::filesystem::path(TROCAR_SHARE) / "rigs" / (name + ".toml"));
+}
 
 struct FakeRig {
   static constexpr std::int64_t ms = 1'000'000;
   static constexpr std::array<std::int32_t, 4> power_on_counts{1234, -567, 8901, -23};
   static constexpr std::uint64_t host = 7;
 
-  rig::Rig rig = shipped_rig();
+  rig::Rig rig;
   std::unique_ptr<Mailboxes> mail = std::make_unique<Mailboxes>();
   virtual_needle::VirtualNeedle needle{};  // without a model until a test offers one
   std::unique_ptr<Controller> controller = std::make_unique<Controller>(rig, *mail, true, &needle);
@@ -40,7 +43,7 @@ struct FakeRig {
   std::vector<Reply> replies;
   std::vector<Event> events;
 
-  FakeRig() {
+  explicit FakeRig(const std::string& name = "ubc_twin") : rig(shipped_rig(name)) {
     feedback.drives = 4;
     feedback.state = hal::LinkState::Operational;
     for (auto& d : feedback.drive) d.heartbeat_ok = true;

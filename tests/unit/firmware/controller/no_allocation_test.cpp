@@ -77,7 +77,7 @@ TEST(NoAllocation, InAnyTickOfHaptic) {
   image.needle.bending_nm2 = 2.3e-3;
   image.needle.axial_n = 5e4;
   const model::Image other = image;
-  FakeRig f;
+  FakeRig f("ubc_twin_haptic");
   f.needle.offer(&image);
   f.positioned();
   allocations_in_tick = 0;
