@@ -51,6 +51,7 @@ struct Feedback {
   std::size_t drives{};
   SensorFeedback sensor{};
   bool complete{};  // every drive fresh this tick
+  bool bus_off{};   // the CAN controller left the drives' bus; only a new start leads back
 };
 
 // Zero-initialised is harmless: everything disabled.
@@ -229,9 +230,10 @@ class RigLink {
       out.fresh = drive.fresh();
       out.enabled = drive.running() && state == canopen::DriveState::OperationEnabled;
       out.faulted = state == canopen::DriveState::Fault || state == canopen::DriveState::FaultReaction;
-      out.heartbeat_ok = drive.running();
+      out.heartbeat_ok = drive.heartbeat_ok();
       out.emcy_code = drive.emergency_code();
     }
+    feedback_.bus_off = bus_off_;
     feedback_.complete = !halted_ && fresh_drives() == master_.drives();
     feedback_.sensor.fresh = sensor_fresh_;
     if (sensor_fresh_) {

@@ -182,6 +182,8 @@ void limits(const Table& table, Rig& rig) {
   l.workspace_y_m = table.numbers<2>("workspace_y_m", offset_range, "[low, high] of the needle base, such as [0.1, 0.2]");
   l.singularity = table.number("singularity", {0.0, 1.0}, "least distance to singularity, from 0 to 1, such as 0.1");
   l.residual_m = table.number("residual_m", {1e-7, 0.1}, "disagreement of the redundant encoders, such as 5e-4");
+  l.torque_error_nm = table.number("torque_error_nm", {1e-6, 1000.0}, "at the joint, measured against commanded torque, such as 0.1");
+  l.torque_error_ticks = count(table, "torque_error_ticks", 1, 1000, "how many ticks in a row are no fault yet, such as 20");
   l.tracking_m = table.number("tracking_m", {1e-6, 1.0}, "largest position error before a fault, such as 0.01");
   l.tracking_rad = table.number("tracking_rad", {1e-5, turn_rad}, "largest angle error before a fault, such as 0.2");
   l.fault_speed_m_s = table.number("fault_speed_m_s", {1e-6, 100.0}, "beyond speed_m_s, such as 0.5");

@@ -41,9 +41,11 @@ enum class Fault : std::uint8_t {
   Singular,        // too close to a singularity
   NotFinite,       // a number is NaN or infinite
   SolverNotConverged,
-  NotPassive,  // a haptic display gave more energy than it took
+  NotPassive,      // a haptic display gave more energy than it took
+  BusOff,          // the CAN controller left the drives' bus
+  TorqueMismatch,  // a drive's torque is not the commanded one
 };
-inline constexpr std::size_t fault_count = 17;
+inline constexpr std::size_t fault_count = 19;
 
 enum class CommandKind : std::uint8_t {
   KeepAlive,    // the commander is alive; resets the host timeout
@@ -162,9 +164,9 @@ struct Sample {
 }
 [[nodiscard]] constexpr const char* to_string(Fault f) noexcept {
   constexpr std::array<const char*, fault_count> names{
-      "None",           "FeedbackLost", "HeartbeatLost", "DriveFault",         "SensorLost", "SensorSaturated",
-      "LateTick",       "EncoderJump",  "Inconsistent",  "TrackingError",      "ForceLimit", "VelocityLimit",
-      "WorkspaceLimit", "Singular",     "NotFinite",     "SolverNotConverged", "NotPassive"};
+      "None",        "FeedbackLost",       "HeartbeatLost", "DriveFault", "SensorLost",    "SensorSaturated", "LateTick",
+      "EncoderJump", "Inconsistent",       "TrackingError", "ForceLimit", "VelocityLimit", "WorkspaceLimit",  "Singular",
+      "NotFinite",   "SolverNotConverged", "NotPassive",    "BusOff",     "TorqueMismatch"};
   return static_cast<std::size_t>(f) < names.size() ? names[static_cast<std::size_t>(f)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(CommandKind k) noexcept {

@@ -35,7 +35,7 @@ class Flexible {
   static constexpr int max_iterations = 24;  // of Newton towards a pose; as many again towards a part of the way
   static constexpr double gain = 10.0;
   static constexpr double slow = 4.0;              // a gain below this is slow
-  static constexpr int most_full_steps = 12;        // towards a pose: each costs (3 contacts)^3 / 3 operations
+  static constexpr int most_full_steps = 12;       // towards a pose: each costs (3 contacts)^3 / 3 operations
   static constexpr double least_nudge_rad = 1e-3;  // out of an unstable equilibrium
   static constexpr double part_way = 0.25;         // of the base's motion that is tried where the whole of it leads nowhere
   static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance

@@ -60,8 +60,10 @@ struct Limits {
   // faults
   std::array<double, 2> workspace_x_m{};  // of the needle base
   std::array<double, 2> workspace_y_m{};
-  double singularity{};  // least distance to singularity, 0 … 1
-  double residual_m{};   // redundant measurement
+  double singularity{};                // least distance to singularity, 0 … 1
+  double residual_m{};                 // redundant measurement
+  double torque_error_nm{};            // at the joint, what a drive measures against what it was told
+  std::uint32_t torque_error_ticks{};  // in a row; fault beyond
   double tracking_m{};
   double tracking_rad{};
   double fault_speed_m_s{};

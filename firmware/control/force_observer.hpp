@@ -66,10 +66,10 @@ struct ForceEstimate {
 
 struct ForceObserverState {
   bool started{};
-  double gap_s{};  // since the last sample that was taken
+  double gap_s{};                                   // since the last sample that was taken
   mechanism::Vec4 angle = mechanism::Vec4::Zero();  // behind the play
-  std::array<DisturbanceState, 4> joint{};  // Nicosia
-  struct {                                  // Momentum, in the middle of the last step
+  std::array<DisturbanceState, 4> joint{};          // Nicosia
+  struct {                                          // Momentum, in the middle of the last step
     bool known{};
     double step_s{};
     mechanism::Vec4 momentum = mechanism::Vec4::Zero();  // N m s

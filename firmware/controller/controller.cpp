@@ -55,6 +55,9 @@ const hal::LinkCommand& Controller::tick(const TickInput& input) noexcept {
 void Controller::acquire(const TickInput& input) noexcept {
   const double nominal_s = 1.0 / rig_.timing.tick_hz;
   dt_s_ = started_ ? std::clamp(1e-9 * static_cast<double>(input.now_ns - now_ns_), 0.1 * nominal_s, longest_step_s) : nominal_s;
+  // Whatever the schedule says: time that went back, or further ahead than a late tick explains, is no time to go on with.
+  const auto nominal_ns = static_cast<std::int64_t>(1e9 * nominal_s);
+  clock_jump_ns_ = started_ ? std::abs(input.now_ns - now_ns_ - nominal_ns) : 0;
   started_ = true;
   now_ns_ = input.now_ns;
   ++tick_;
@@ -65,6 +68,8 @@ void Controller::acquire(const TickInput& input) noexcept {
     missed_feedback_ = 0;
     bool still = true;
     for (std::size_t i = 0; i < rig_.drives(); ++i) {
+      const double error_nm = std::abs(link_.drive[i].joint_torque_nm - acted_nm_[static_cast<Eigen::Index>(i)]);
+      torque_error_ticks_[i] = error_nm > rig_.limits.torque_error_nm ? torque_error_ticks_[i] + 1 : 0;
       counts_[i] = link_.drive[i].position_counts;
       still = still && std::abs(std::int64_t{counts_[i]} - rest_counts_[i]) <= rest_counts;
     }
@@ -129,8 +134,9 @@ void Controller::observe_force() noexcept {
   const double c = std::cos(state_.x[2]);
   const double s = std::sin(state_.x[2]);
   base_wrench_ = {c * w[0] - s * w[1], s * w[0] + c * w[1], w[2]};
-  // One NaN would stay in a low-pass for ever; that it came is told by base_wrench_.
-  if (base_wrench_.allFinite()) load_ += (1.0 - std::exp(-load_bandwidth_rad_s * dt_s_)) * (base_wrench_ - load_);
+  // One NaN would stay in a low-pass for ever; that it came is told by base_wrench_. What a sensor at its end says would throw the handle.
+  if (base_wrench_.allFinite() && !link_.sensor.saturated)
+    load_ += (1.0 - std::exp(-load_bandwidth_rad_s * dt_s_)) * (base_wrench_ - load_);
 }
 
 void Controller::check(bool violated, Fault fault, double value, double limit) noexcept {
@@ -175,15 +181,17 @@ void Controller::supervise(const TickInput& input) noexcept {
   if (!safety::has_torque(mode_) && !position_controlled()) return;
 
   const auto& l = rig_.limits;
+  check(link_.bus_off, Fault::BusOff, 0.0, 0.0);
   check(missed_feedback_ > rig_.timing.missed_feedback_ticks, Fault::FeedbackLost, missed_feedback_, rig_.timing.missed_feedback_ticks);
   for (std::size_t i = 0; i < rig_.drives(); ++i) {
     const auto& drive = link_.drive[i];
     check(!drive.heartbeat_ok, Fault::HeartbeatLost, static_cast<double>(i + 1), 0.0);
-    check(drive.faulted || (drive.fresh && !drive.enabled), Fault::DriveFault, drive.emcy_code, 0.0);
+    check(drive.faulted || drive.emcy_code != 0 || (drive.fresh && !drive.enabled), Fault::DriveFault, drive.emcy_code, 0.0);
+    check(torque_error_ticks_[i] > l.torque_error_ticks, Fault::TorqueMismatch, static_cast<double>(i + 1), 0.0);
   }
   check(!operational, Fault::DriveFault, 0.0, 0.0);
-  check(input.wakeup_late_ns > late_limit_ns_, Fault::LateTick, 1e-3 * static_cast<double>(input.wakeup_late_ns),
-        1e-3 * static_cast<double>(late_limit_ns_));
+  const std::int64_t late_ns = std::max(input.wakeup_late_ns, clock_jump_ns_);
+  check(late_ns > late_limit_ns_, Fault::LateTick, 1e-3 * static_cast<double>(late_ns), 1e-3 * static_cast<double>(late_limit_ns_));
   check(!state_.x.allFinite() || !velocity_.allFinite() || !base_wrench_.allFinite(), Fault::NotFinite, 0.0, 0.0);
   if (link_.complete) {
     const double jump = jump_factor * l.fault_speed_m_s * dt_s_ * gap_ticks_;

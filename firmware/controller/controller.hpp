@@ -150,6 +150,8 @@ class Controller {
   // Joint torques: of the last tick's command, which act from this tick's SYNC on, and of the one before, which acted up to it.
   mechanism::Vec4 sent_nm_ = mechanism::Vec4::Zero();
   mechanism::Vec4 acted_nm_ = mechanism::Vec4::Zero();
+  std::array<std::uint32_t, capacity::drives> torque_error_ticks_{};
+  std::int64_t clock_jump_ns_{};
   double since_hand_s_{};  // since the last sample that the observer took
 
   // what runs

@@ -2,9 +2,12 @@
 // safety page read this table.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 
 #include "common/core/contracts.hpp"
+#include "common/rig/rig.hpp"
 
 namespace trocar::safety {
 
@@ -47,8 +50,40 @@ inline constexpr std::array<FaultRow, fault_count> fault_table{{
     {Fault::SolverNotConverged, Reaction::Hold, "the contact solver hit its bound", "keep the recording, lower the speed, then reset"},
     {Fault::NotPassive, Reaction::Hold, "the haptic display gave more energy than it had taken",
      "hold the handle firmly, choose a softer scene, then reset"},
+    {Fault::BusOff, Reaction::TorqueOff, "the CAN controller left the drives' bus after too many errors",
+     "check cable, terminators and bit rate, then start trocar-rig again"},
+    {Fault::TorqueMismatch, Reaction::TorqueOff, "a drive's measured torque is not the commanded one",
+     "check that drive's current limit and motor cable, then reset"},
 }};
 
 [[nodiscard]] constexpr const FaultRow& row(Fault fault) noexcept { return fault_table[static_cast<std::size_t>(fault)]; }
+
+// How long a cause may last before it is a fault, in ticks; 0 for what is one at once, and for limits of motion, which are reached when
+// they are.
+[[nodiscard]] constexpr std::uint32_t patience_ticks(Fault fault, const rig::Rig& rig) noexcept {
+  switch (fault) {
+    case Fault::FeedbackLost:
+      return rig.timing.missed_feedback_ticks;
+    case Fault::HeartbeatLost:
+      return static_cast<std::uint32_t>(1e-3 * rig.timing.heartbeat_timeout_ms * rig.timing.tick_hz);
+    case Fault::SensorLost:
+      return rig.timing.missed_sensor_ticks;
+    case Fault::TorqueMismatch:
+      return rig.limits.torque_error_ticks;
+    default:
+      return 0;
+  }
+}
+
+// From the latched fault to the safe state, at most: torque off acts with the next SYNC; braking takes the longest stop that the limits
+// allow (at constant jerk up to the acceleration, then at that, then back).
+[[nodiscard]] constexpr std::uint32_t settle_ticks(Reaction reaction, const rig::Rig& rig) noexcept {
+  if (reaction == Reaction::TorqueOff) return 1;
+  const rig::Limits& l = rig.limits;
+  const auto stop_s = [](double speed, double acceleration, double jerk) { return speed / acceleration + 3.0 * acceleration / jerk; };
+  const double longest_s = std::max(stop_s(l.speed_m_s, l.acceleration_m_s2, l.jerk_m_s3),
+                                    stop_s(l.angular_speed_rad_s, l.angular_acceleration_rad_s2, l.angular_jerk_rad_s3));
+  return static_cast<std::uint32_t>(longest_s * rig.timing.tick_hz) + 2;
+}
 
 }  // namespace trocar::safety

@@ -30,7 +30,7 @@ bool MemoryPort::send(const CanFrame& frame, std::int64_t now_ns) noexcept {
 bool MemoryPort::receive(CanFrame& frame, std::int64_t now_ns) noexcept {
   bus_->advance(now_ns);
   if (!received_.pop(frame)) return false;
-  ++counters_.received;
+  count_received(counters_, frame);
   return true;
 }
 

@@ -24,6 +24,8 @@ class MemoryPort {
   bool send(const CanFrame& frame, std::int64_t now_ns) noexcept;
   void flush(std::int64_t) noexcept {}
   bool receive(CanFrame& frame, std::int64_t now_ns) noexcept;
+  // As if this port's CAN controller had reported an error: received next.
+  void report(const CanFrame& error) noexcept { (void)received_.push(error); }
   [[nodiscard]] const BusCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] int file_descriptor() const noexcept { return -1; }
 

@@ -81,6 +81,7 @@ void DriveMaster::heartbeat(NmtState state, std::int64_t now_ns) noexcept {
       report_.problem = DriveProblem::Rebooted;
       report_.remedy = "check the drive's supply";
     }
+    emergency_code_ = emcy_none;
     enter(DrivePhase::Configure, now_ns);
     return;
   }

@@ -86,6 +86,10 @@ class DriveMaster {
   [[nodiscard]] DrivePhase phase() const noexcept { return report_.phase; }
   [[nodiscard]] bool configured() const noexcept { return report_.phase >= DrivePhase::Configured && report_.phase <= DrivePhase::Running; }
   [[nodiscard]] bool running() const noexcept { return report_.phase == DrivePhase::Running; }
+  // A drive that left operation, or booted anew, has said so: its heartbeat is not what is missing.
+  [[nodiscard]] bool heartbeat_ok() const noexcept {
+    return running() || report_.problem == DriveProblem::LeftOperational || report_.problem == DriveProblem::Rebooted;
+  }
   [[nodiscard]] bool waits_for_sdo() const noexcept { return sdo_.state() == SdoClient::State::Waiting; }
   [[nodiscard]] const DriveReport& report() const noexcept { return report_; }
   [[nodiscard]] const DriveCounters& counters() const noexcept { return counters_; }

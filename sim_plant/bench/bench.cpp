@@ -1,5 +1,7 @@
 #include "sim_plant/bench/bench.hpp"
 
+#include "hal/canopen/objects.hpp"
+
 namespace trocar::sim_plant {
 
 namespace {
@@ -23,16 +25,65 @@ Bench::Bench(const rig::Rig& rig, const PlantConfig& plant, const std::optional<
 }
 
 void Bench::step_plant(std::int64_t now_ns) noexcept {
-  plant_.advance(now_ns);
-  hal::CanFrame frame;
-  for (std::size_t i = 0; i < WiredPlant::drives; ++i) {
-    hal::MemoryPort& port = drives_bus_.port(i + 1);
-    while (port.receive(frame, now_ns)) plant_.drive_receives(i, frame, now_ns);
-    while (plant_.drive_transmits(i, frame)) port.send(frame, now_ns);
+  if (faults_.any()) {
+    afflict(now_ns);
+    if (faults_.on(Ailment::Frozen, 0, now_ns) != nullptr) return;
   }
-  hal::MemoryPort& port = sensor_bus_.port(1);
-  while (port.receive(frame, now_ns)) plant_.sensor_receives(frame, now_ns);
-  while (plant_.sensor_transmits(frame)) port.send(frame, now_ns);
+  plant_.advance(now_ns);
+  for (std::size_t i = 0; i < WiredPlant::drives; ++i)
+    exchange(
+        Wire::Drives, drives_bus_.port(i + 1), now_ns, [&](const hal::CanFrame& f) { plant_.drive_receives(i, f, now_ns); },
+        [&](hal::CanFrame& f) { return plant_.drive_transmits(i, f); });
+  exchange(
+      Wire::Sensor, sensor_bus_.port(1), now_ns, [&](const hal::CanFrame& f) { plant_.sensor_receives(f, now_ns); },
+      [&](hal::CanFrame& f) { return plant_.sensor_transmits(f); });
+}
+
+template <class Take, class Give>
+void Bench::exchange(Wire wire, hal::MemoryPort& port, std::int64_t now_ns, Take&& take, Give&& give) noexcept {
+  hal::CanFrame frame;
+  const auto send = [&](const hal::CanFrame& f) { port.send(f, now_ns); };
+  while (port.receive(frame, now_ns)) {
+    if (faults_.any())
+      faults_.carry(wire, Way::ToPlant, frame, now_ns, take);
+    else
+      take(frame);
+  }
+  while (give(frame)) {
+    if (faults_.any())
+      faults_.carry(wire, Way::FromPlant, frame, now_ns, send);
+    else
+      send(frame);
+  }
+  if (faults_.any()) faults_.release(wire, now_ns, send);
+}
+
+// Troubles of the parts.
+void Bench::afflict(std::int64_t now_ns) noexcept {
+  for (std::size_t i = 0; i < WiredPlant::drives; ++i) {
+    DriveTrouble now;
+    now.stuck = faults_.on(Ailment::EncoderStuck, i, now_ns) != nullptr;
+    now.backwards = faults_.on(Ailment::EncoderBackwards, i, now_ns) != nullptr;
+    if (const Trouble* t = faults_.on(Ailment::EncoderJumped, i, now_ns)) now.jump_rad = t->amount;
+    now.dead = faults_.on(Ailment::MotorDead, i, now_ns) != nullptr;
+    now.full = faults_.on(Ailment::MotorFull, i, now_ns) != nullptr;
+    plant_.trouble(i, now);
+    if (const Trouble* t = faults_.once(Ailment::DriveFault, i, now_ns))
+      plant_.drive(i).trigger_fault(static_cast<std::uint16_t>(t->amount));
+    if (faults_.once(Ailment::PowerCut, i, now_ns) != nullptr) plant_.drive(i).restart();
+    hal::MemoryPort& port = drives_bus_.port(i + 1);
+    const std::uint8_t node = rig_.buses.drive_node[i];
+    if (const Trouble* t = faults_.once(Ailment::Emergency, i, now_ns)) {
+      hal::CanFrame emergency{.id = hal::canopen::cob_emergency(node), .length = 8};
+      hal::store(emergency, 0, static_cast<std::uint16_t>(t->amount));
+      port.send(emergency, now_ns);
+    }
+    if (faults_.once(Ailment::LeftOperation, i, now_ns) != nullptr)
+      plant_.drive_receives(i, hal::canopen::nmt_frame(hal::canopen::NmtCommand::PreOperational, node), now_ns);
+  }
+  plant_.saturate_sensor(faults_.on(Ailment::SensorSaturated, 0, now_ns) != nullptr);
+  if (faults_.once(Ailment::BusOff, 0, now_ns) != nullptr)
+    drives_bus_.port(rig_port).report({.id = hal::error_class_bus_off, .error = true});
 }
 
 void Bench::tick() noexcept {

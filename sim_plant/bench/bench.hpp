@@ -11,6 +11,7 @@
 #include "firmware/virtual_needle/virtual_needle.hpp"
 #include "hal/can/memory_bus.hpp"
 #include "hal/rig_link.hpp"
+#include "sim_plant/faults/faults.hpp"
 #include "sim_plant/hand/hand.hpp"
 #include "sim_plant/wired/wired_plant.hpp"
 
@@ -25,6 +26,8 @@ class Bench {
 
   // From now on this hand holds the handle; nullptr: nobody.
   void give_to(Hand* hand) noexcept { plant_.give_to(hand); }
+  // What goes wrong, and when (bench time).
+  [[nodiscard]] Faults& faults() noexcept { return faults_; }
   // Drives get every command a tick later than they should.
   void delay_commands(bool late) noexcept { late_ = late; }
 
@@ -40,6 +43,9 @@ class Bench {
 
  private:
   void step_plant(std::int64_t now_ns) noexcept;
+  template <class Take, class Give>
+  void exchange(Wire wire, hal::MemoryPort& port, std::int64_t now_ns, Take&& take, Give&& give) noexcept;
+  void afflict(std::int64_t now_ns) noexcept;
 
   rig::Rig rig_;
   std::unique_ptr<controller::Mailboxes> mail_;
@@ -47,6 +53,7 @@ class Bench {
   hal::RigLink<hal::MemoryPort> link_;
   controller::Controller controller_;
   WiredPlant plant_;
+  Faults faults_;
   bool late_{false};
   hal::LinkCommand held_{};
   std::int64_t now_ns_{};

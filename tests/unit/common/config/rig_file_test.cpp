@@ -174,7 +174,7 @@ TEST_F(RigFileTest, RefusesBadInputOfEveryClass) {
 
 TEST_F(RigFileTest, RefusesAKeyThatItDoesNotKnow) {
   const std::string message = error_of(std::string(twin_rig) + "bitrate_kbps = 1000\n", read_rig);
-  expect_parts(message, {"file.toml:90: buses.sensor.bitrate_kbps = 1000: unknown key; remove it; known here: host, interface"});
+  expect_parts(message, {"file.toml:92: buses.sensor.bitrate_kbps = 1000: unknown key; remove it; known here: host, interface"});
   expect_parts(error_of("nmae = \"x\"\n", read_rig), {"file.toml: name: missing", "Line 1 has nmae: was name meant?"});
 }
 
@@ -238,7 +238,7 @@ TEST_F(RigFileTest, RefusesAddressesThatAreTakenOrAmbiguous) {
       edited(edited(twin_rig, "rig_port = 20001\nplant_port = 20000\n", "").text, "host = \"127.0.0.1\"", "interface = \"can1\"");
   expect_parts(error_of(shared.text, read_rig), {"buses.sensor.interface = \"can1\": the drives use this bus", "its own"});
   const auto none = edited(twin_rig, "interface = \"can1\"", "");
-  expect_parts(error_of(none.text, read_rig), {"file.toml:88: buses.sensor.interface: missing; add interface = \"can0\", or rig_port"});
+  expect_parts(error_of(none.text, read_rig), {"file.toml:90: buses.sensor.interface: missing; add interface = \"can0\", or rig_port"});
 }
 
 TEST_F(RigFileTest, RefusesNamesThatAreTakenOrTooLong) {

@@ -35,6 +35,7 @@ struct FakeRig {
   bool drives_answer = true;
   bool sensor_answers = true;
   bool drives_enable = true;  // follow the request
+  bool torque_follows = true;
   bool host_talks = true;     // a KeepAlive in every tick
   bool follows = true;        // the handle stands at the set point
   bool torque_finite = true;  // over all ticks
@@ -63,6 +64,8 @@ struct FakeRig {
 
   void tick(int n = 1) {
     for (int k = 0; k < n; ++k) {
+      for (std::size_t i = 0; i < 4; ++i) feedback.drive[i].joint_torque_nm = torque_follows ? acted_nm_[i] : 0.0;
+      acted_nm_ = out.joint_torque_nm;
       for (auto& d : feedback.drive) {
         d.fresh = drives_answer;
         d.enabled = drives_enable && !d.faulted && out.request == hal::DriveRequest::Enable;
@@ -151,6 +154,7 @@ struct FakeRig {
 
  private:
   mechanism::Vec4 near_ = mechanism::Vec4::Zero();
+  std::array<double, 4> acted_nm_{};
 };
 
 }  // namespace trocar::controller

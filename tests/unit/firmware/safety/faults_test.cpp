@@ -9,7 +9,7 @@ namespace trocar::safety {
 namespace {
 
 TEST(Faults, EveryFaultHasItsRowInTheOrderOfTheEnum) {
-  ASSERT_EQ(static_cast<std::size_t>(Fault::NotPassive) + 1, fault_count);
+  ASSERT_EQ(static_cast<std::size_t>(Fault::TorqueMismatch) + 1, fault_count);
   for (std::size_t i = 0; i < fault_count; ++i) {
     const auto fault = static_cast<Fault>(i);
     EXPECT_EQ(row(fault).fault, fault) << to_string(fault);
