@@ -31,6 +31,7 @@ ExperimentSetup read_setup(const std::string& name, const std::vector<double>& s
   experiment::replace(s.experiment, speeds_m_s, hand);
   s.rig_file = config::find_share("rigs", s.experiment.rig);
   s.rig = config::read_twin(s.rig_file);
+  if (s.experiment.haptic() && !s.rig.haptic.present) config::refuse_haptic(s.rig_file, "");
   s.scene_file = config::find_share("scenes", s.experiment.scene);
   const scene::Scene scene = scene::read_scene(s.scene_file);
   scene::require_insertion(scene);

@@ -25,6 +25,8 @@
 #include "common/model/image.hpp"
 #include "common/scene/scene.hpp"
 #include "common/wire/convert.hpp"
+#include "firmware/control/force_observer.hpp"
+#include "firmware/virtual_needle/virtual_needle.hpp"
 #include "sim_plant/bench/bench.hpp"
 #include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
@@ -51,7 +53,7 @@ constexpr std::int64_t keep_alive_ns = 20'000'000;
 
 // The scene as the controller's model, in place of tissue.
 struct Model {
-  explicit Model(const scene::Scene& scene) {
+  Model(const scene::Scene& scene, const rig::Rig& rig) : needle({rig.haptic.fade_s}) {
     condense::Options options;
     options.visible = condense::WithVisible::No;
     bytes = condense::compile_to_memory(scene, options).image;
@@ -69,7 +71,12 @@ int run(const Options& options) {
   std::vector<double> speeds;
   for (const double v : options.speeds_mm_s) speeds.push_back(1e-3 * v);
   experiment::replace(e, speeds, options.hand);
-  const rig::Rig rig = config::read_twin(config::find_share("rigs", e.rig));
+  const auto rig_file = config::find_share("rigs", e.rig);
+  const rig::Rig rig = config::read_twin(rig_file);
+  if (e.haptic()) {  // as trocar-rig does
+    const control::Admissible verdict = rig.haptic.present ? control::admit(rig).verdict : control::Admissible::NotPositive;
+    if (verdict != control::Admissible::Yes) config::refuse_haptic(rig_file, control::to_text(verdict));
+  }
   const scene::Scene scene = scene::read_scene(config::find_share("scenes", e.scene));
   scene::require_insertion(scene);
   const auto entry = scene::entry_m(scene);
@@ -80,7 +87,7 @@ int run(const Options& options) {
   std::optional<sim_plant::Hand> hand;
   if (e.haptic()) {
     hand = sim_plant::read_hand(config::find_share("hands", e.hand), options.seed);
-    model = std::make_unique<Model>(scene);
+    model = std::make_unique<Model>(scene, rig);
   }
   sim_plant::Bench bench(rig, plant, model ? std::nullopt : std::optional(scene), options.seed, model ? &model->needle : nullptr);
   if (hand) bench.give_to(&*hand);

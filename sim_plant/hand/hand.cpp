@@ -32,8 +32,17 @@ Hand::Hand(const HandConfig& config, Habit habit)
       random_(config.seed),
       holds_(false) {}
 
-void Hand::want(std::vector<Intention> way) { way_ = std::move(way); }
+void Hand::want(std::vector<Intention> way) {
+  forget_habit();
+  way_ = std::move(way);
+}
+
+void Hand::forget_habit() noexcept {
+  habit_.reset();
+  begin_s_ = period_s_ = 0.0;
+}
 void Hand::replay(std::vector<RecordedWrench> recording, const RecordedArm& arm) {
+  forget_habit();
   recording_ = std::move(recording);
   recorded_arm_ = arm;
 }

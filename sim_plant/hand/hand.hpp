@@ -77,7 +77,7 @@ class Hand {
   // Away from the handle, until the motors come on.
   Hand(const HandConfig& config, Habit habit);
 
-  // Times increase; between two points minimum jerk, before the first and after the last one rest. Replaces what it wanted.
+  // Times increase; between two points minimum jerk, before the first and after the last one rest. Replaces what it wanted, and its habit.
   void want(std::vector<Intention> way);
   // From now on this, linear in between, zero before and after; empty: the arm again.
   void replay(std::vector<RecordedWrench> recording, const RecordedArm& arm = {});
@@ -95,6 +95,7 @@ class Hand {
   [[nodiscard]] Vector3 wanted(double time_s) const noexcept;
 
  private:
+  void forget_habit() noexcept;
   struct Tremor {
     double x{}, v{};
   };

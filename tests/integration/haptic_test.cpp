@@ -17,10 +17,15 @@ namespace {
 
 constexpr double demo_s = 60.0;
 
+// A shared machine may starve the simulated drives for longer; that is not tested here.
+std::filesystem::path haptic_rig(const Scratch& scratch) {
+  return scratch.make_rig({{"missed_feedback_ticks = 20", "missed_feedback_ticks = 1000"}}, "ubc_twin_haptic");
+}
+
 // Two displays, 1.4 s each, for a person who is quick about it.
 struct Quick {
   explicit Quick(const Scratch& scratch, const std::string& displays = R"(["impedance", "admittance"])") : hand(scratch / "hand.toml") {
-    scratch.make_rig({{"missed_feedback_ticks = 20", "missed_feedback_ticks = 1000"}}, "ubc_twin_haptic");
+    const std::string rig = haptic_rig(scratch).string();
     write_text(hand, shared_file("hands/person.toml", {{"take_after_s = 0.5", "take_after_s = 0.1"},
                                                        {"forward_m = 0.075", "forward_m = 0.03"},
                                                        {"push_speed_m_s = 0.025", "push_speed_m_s = 0.06"},
@@ -28,7 +33,7 @@ struct Quick {
                                                        {"rest_out_s = 1.0", "rest_out_s = 0.2"},
                                                        {"rest_in_s = 1.0", "rest_in_s = 0.2"}}));
     write_text(scratch / "haptic.toml",
-               shared_file("experiments/haptic.toml", {{R"(rig = "ubc_twin_haptic")", "rig = \"" + (scratch / "rig.toml").string() + "\""},
+               shared_file("experiments/haptic.toml", {{R"(rig = "ubc_twin_haptic")", "rig = \"" + rig + "\""},
                                                        {R"(hand = "person")", "hand = \"" + hand.string() + "\""},
                                                        {R"(["four_channel", "impedance", "admittance"])", displays},
                                                        {"display_s = 8.0", "display_s = 1.4"},
@@ -137,15 +142,27 @@ TEST(Haptic, BadHandIsRefusedAndNothingStays) {
   EXPECT_TRUE(processes_mentioning(out).empty());
 }
 
+TEST(Haptic, ARigThatIsNoHapticDeviceIsRefused) {
+  const Scratch scratch;
+  const auto rig = scratch.make_rig();
+  const auto experiment = scratch / "haptic.toml";
+  const std::string out = (scratch / "out").string();
+  write_text(experiment, shared_file("experiments/haptic.toml", {{R"(rig = "ubc_twin_haptic")", "rig = \"" + rig.string() + "\""}}));
+  const Words words{rig.string() + ":", "no haptic device", "take ubc_twin_haptic"};
+  expect_refusal(scratch, "trocar-bench", {"--experiment", experiment.string(), "--out", out}, words);
+  expect_refusal(scratch, "trocar", {"demo", "--experiment", experiment.string(), "--out", out}, words);
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
 TEST(Haptic, ACompiledSceneIsFeltUntilCtrlC) {
   const Scratch scratch;
   const std::string domain = std::to_string(own_domain());
   const auto image = scratch / "phantom.image";
   Program compile(scratch, "trocar", {"scene", "compile", "phantom", "--out", image.string()});
   ASSERT_EQ(compile.wait(answer_s), 0) << compile.errors();
-  const std::string rig_file = scratch.make_rig({}, "ubc_twin_haptic").string();
-  Program plant(scratch, "trocar-plant", {"--rig", rig_file});
-  ASSERT_TRUE(plant.wait_for("before scene", answer_s)) << plant.errors();
+  const std::string rig_file = haptic_rig(scratch).string();
+  Program plant(scratch, "trocar-plant", {"--rig", rig_file, "--plant", "ubc_twin_haptic", "--no-tissue"});
+  ASSERT_TRUE(plant.wait_for("before no tissue", answer_s)) << plant.errors();
   Program rig(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort", "--model", image.string()});
   ASSERT_TRUE(rig.wait_for("DDS domain", answer_s)) << rig.errors();
 
@@ -176,13 +193,13 @@ TEST(Haptic, ACompiledSceneIsFeltUntilCtrlC) {
 TEST(Haptic, IsRefusedWithoutAModelAndWithADamagedOne) {
   const Scratch scratch;
   const std::string domain = std::to_string(own_domain());
-  const std::string rig_file = scratch.make_rig({}, "ubc_twin_haptic").string();
+  const std::string rig_file = haptic_rig(scratch).string();
   const auto damaged = scratch / "damaged.image";
   std::ofstream(damaged) << "this is no image";
   expect_refusal(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort", "--model", damaged.string()},
                  {"damaged.image"});
-  Program plant(scratch, "trocar-plant", {"--rig", rig_file});
-  ASSERT_TRUE(plant.wait_for("before scene", answer_s)) << plant.errors();
+  Program plant(scratch, "trocar-plant", {"--rig", rig_file, "--plant", "ubc_twin_haptic", "--no-tissue"});
+  ASSERT_TRUE(plant.wait_for("before no tissue", answer_s)) << plant.errors();
   Program rig(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort"});
   ASSERT_TRUE(rig.wait_for("DDS domain", answer_s)) << rig.errors();
   host::RigClient client(own_domain());

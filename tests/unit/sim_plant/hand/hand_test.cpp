@@ -120,6 +120,20 @@ TEST(Hand, PlaysARecordingWhateverTheHandleDoes) {
   EXPECT_EQ(hand.advance(0.3, {}, {}, dt), Vector3{});
 }
 
+TEST(Hand, ANewWantEndsAHabit) {
+  Habit habit;
+  habit.way = {{0.0, {}}, {1.0, {0.05, 0.0, 0.0}}};
+  habit.period_s = 1.0;
+  Hand hand({}, habit);
+  hand.notice(true, 5.0, home);
+  ASSERT_TRUE(hand.holds());
+  hand.want({{6.0, home}, {7.0, {0.02, 0.12, 1.5}}, {8.0, {0.03, 0.12, 1.5}}});
+  hand.notice(false, 6.0, home);
+  EXPECT_TRUE(hand.holds());
+  EXPECT_EQ(hand.wanted(7.0)[0], 0.02);
+  EXPECT_EQ(hand.wanted(100.0)[0], 0.03);
+}
+
 // A handle that is thrown about in a resting hand gets no energy out of it but what is stored.
 TEST(Hand, IsPassiveAroundRest) {
   Hand hand({}, home);
