@@ -1,13 +1,19 @@
 #include "common/wire/dds.hpp"
 
+#include <dlfcn.h>
+
 #include <array>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "dds/ddsi/ddsi_serdata.h"
+#include "dds/ddsrt/log.h"
 
 namespace trocar::wire {
 
@@ -33,18 +39,53 @@ constexpr const char* loopback_configuration = R"(
   throw Error(what + ": " + dds_strretcode(code) + "; " + remedy);
 }
 
+const char* keys_folder() {
+  const char* const folder = std::getenv("TROCAR_KEYS");
+  return folder != nullptr && *folder != '\0' ? folder : nullptr;
+}
+
+void replace(std::string& text, std::string_view what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size()) text.replace(at, what.size(), by);
+}
+
+// Cyclone's plugins lie beside its library, or in a folder that Debian names after the package.
+std::filesystem::path plugins() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(&dds_create_participant), &info) == 0 || info.dli_fname == nullptr) return {};
+  const std::filesystem::path beside = std::filesystem::canonical(info.dli_fname).parent_path();
+  for (const auto& folder : {beside, beside / "libddsc0debian"})
+    if (std::filesystem::exists(folder / "libdds_security_auth.so")) return folder;
+  return {};
+}
+
+std::string configuration_of(const std::filesystem::path& keys) {
+  const auto file = keys / "network.xml";
+  std::ifstream in(file);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in || text.empty())
+    throw Error("TROCAR_KEYS: " + file.string() + " cannot be read; name a folder rig, host or observer that trocar keys made");
+  const auto folder = plugins();
+  if (folder.empty()) throw Error("TROCAR_KEYS: this Cyclone DDS has no security plugins; install Debian's libddsc0debian with them");
+  replace(text, "@KEYS@", std::filesystem::canonical(keys).string());
+  replace(text, "@PLUGINS@", folder.string());
+  return text;
+}
+
 // A configuration can be given only while a domain is created, so the process's participants of one domain share the handle.
 std::shared_ptr<Entity> configure(std::uint32_t domain) {
-  if (std::getenv("CYCLONEDDS_URI") != nullptr) return nullptr;
+  if (reach() == Reach::Open) return nullptr;
   static std::mutex mutex;
   static std::map<std::uint32_t, std::weak_ptr<Entity>> known;
   const std::lock_guard lock(mutex);
   if (auto present = known[domain].lock()) return present;
-  const dds_entity_t handle = dds_create_domain(domain, loopback_configuration);
+  const std::string configuration = keys_folder() != nullptr ? configuration_of(keys_folder()) : loopback_configuration;
+  const dds_entity_t handle = dds_create_domain(domain, configuration.c_str());
   if (handle == DDS_RETCODE_PRECONDITION_NOT_MET) return nullptr;  // made by somebody else in this process
   if (handle < 0) {
-    fail("DDS domain " + std::to_string(domain) + " cannot be opened on the loopback interface", handle,
-         "bring it up (ip link set lo up) or choose another interface in CYCLONEDDS_URI");
+    if (keys_folder() != nullptr)
+      fail("DDS domain " + std::to_string(domain) + " cannot be opened with the keys in " + keys_folder(), handle,
+           "check that the interface in its network.xml is up");
+    fail("DDS domain " + std::to_string(domain) + " cannot be opened on the loopback interface", handle, "bring it up (ip link set lo up)");
   }
   auto made = std::make_shared<Entity>(handle);
   known[domain] = made;
@@ -89,6 +130,13 @@ const dds_topic_descriptor_t& descriptor_of(const Topic& topic) {
   throw Error(std::string("no IDL type is called ") + topic.type);
 }
 
+Reach reach() {
+  if (keys_folder() != nullptr) return Reach::Secured;
+  return std::getenv("CYCLONEDDS_URI") != nullptr ? Reach::Open : Reach::Loopback;
+}
+
+void hush() { dds_set_log_mask(DDS_LC_FATAL); }
+
 Participant::Participant(std::uint32_t domain) : domain_(domain) {
   if (domain > max_domain) {
     throw Error("DDS domain " + std::to_string(domain) + " does not exist; choose 0 … " + std::to_string(max_domain));
@@ -97,7 +145,8 @@ Participant::Participant(std::uint32_t domain) : domain_(domain) {
   const dds_entity_t handle = dds_create_participant(domain, nullptr, nullptr);
   if (handle < 0) {
     fail("DDS domain " + std::to_string(domain) + " cannot be joined", handle,
-         "end programs that are no longer needed there, choose another domain, or check CYCLONEDDS_URI");
+         reach() == Reach::Secured ? "check the keys in TROCAR_KEYS: made by one authority, not expired, readable"
+                                   : "end programs that are no longer needed there, choose another domain, or check CYCLONEDDS_URI");
   }
   entity_ = Entity(handle);
 }
@@ -114,6 +163,8 @@ Entity make_reader(const Participant& participant, const Topic& topic) {
 Entity make_writer(const Participant& participant, const Topic& topic) {
   const Entity dds_topic = make_topic(participant, topic);
   const dds_entity_t handle = dds_create_writer(participant.entity(), dds_topic.get(), quality(topic).get(), nullptr);
+  if (handle == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY)
+    fail(std::string("these keys may not write ") + topic.name, handle, "use the keys of another role in TROCAR_KEYS");
   if (handle < 0) fail(std::string("no writer for ") + topic.name, handle, "this is a defect of the program: report it");
   return Entity(handle);
 }

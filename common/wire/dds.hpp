@@ -1,6 +1,8 @@
 // Thin ownership over the Cyclone DDS C API: participant, reader, writer, wait set. Errors are exceptions that say what to do.
 // For threads that may allocate and wait only: writing a sample allocates.
-// Unless CYCLONEDDS_URI is set, traffic stays on the loopback interface.
+// Traffic stays on the loopback interface, unless TROCAR_KEYS names a folder of keys (host/keys): then it goes where these say, signed and
+// encrypted, among those whose keys are of the same authority. CYCLONEDDS_URI alone makes an open network. SECURITY.md says what that
+// means.
 #pragma once
 
 #include <chrono>
@@ -44,6 +46,17 @@ class Entity {
  private:
   dds_entity_t handle_{};
 };
+
+enum class Reach : std::uint8_t {
+  Loopback,
+  Secured,  // TROCAR_KEYS
+  Open,     // CYCLONEDDS_URI: whoever is there may command
+};
+[[nodiscard]] Reach reach();
+
+// From now on Cyclone keeps to itself what it would print: a command says one line, its own. The rig's process lets it speak, of strangers
+// that knock for instance.
+void hush();
 
 class Participant {
  public:

@@ -18,6 +18,7 @@
 #include "host/cli/needle_command.hpp"
 #include "host/cli/rig_commands.hpp"
 #include "host/cli/scene_commands.hpp"
+#include "host/keys/keys.hpp"
 #include "host/solve/solve.hpp"
 
 namespace {
@@ -208,6 +209,20 @@ int main(int argc, char** argv) {
   bend_command->callback([&] {
     bend.needle = config::find_share("needles", bend.needle.string());
     code = cli::needle_bend(bend);
+  });
+
+  auto* keys_command = app.add_subcommand(
+      "keys",
+      "make the keys with which rig and host speak over a network instead of within one machine\n"
+      "Example: trocar keys keys/ --interface eth1 --peer 192.168.7.1 --peer 192.168.7.2\n"
+      "Then: copy keys/rig to the rig's machine, keys/host to yours, and set TROCAR_KEYS there to that folder. ca_key.pem stays with you.");
+  keys::Options network;
+  keys_command->add_option("folder", network.folder, "folder to make")->required();
+  keys_command->add_option("--interface", network.interface, "network interface on which both machines meet")->required();
+  keys_command->add_option("--peer", network.peers, "address of a machine there; give each of them")->required();
+  keys_command->callback([&] {
+    keys::make(network);
+    fmt::print("{}: keys for rig, host and observer; on each machine: export TROCAR_KEYS=FOLDER/ROLE\n", network.folder.string());
   });
 
   auto* rig_command = app.add_subcommand("rig", "look at a rig, home, arm, hold and stop it");

@@ -72,7 +72,10 @@ struct RigClient::Entities {
   wire::WaitSet wait;
 };
 
-RigClient::RigClient(std::uint32_t domain) : session_(random_session()), entities_(std::make_unique<Entities>(domain)) {}
+RigClient::RigClient(std::uint32_t domain) : session_(random_session()) {
+  wire::hush();
+  entities_ = std::make_unique<Entities>(domain);
+}
 RigClient::~RigClient() = default;
 
 RigStatus RigClient::wait_for_rig(double timeout_s) {
@@ -83,9 +86,9 @@ RigStatus RigClient::wait_for_rig(double timeout_s) {
     // A command must not be lost because the rig's reader was not matched yet.
     if (found && entities_->commands.matched() > 0 && entities_->replies.matched() > 0) return *found;
   }
-  throw config::UserError(
-      fmt::format("no rig answers on DDS domain {}: start trocar-rig (and trocar-plant for a simulated one), or give --domain",
-                  entities_->participant.domain()));
+  throw config::UserError(fmt::format(
+      "no rig answers on DDS domain {}{}: start trocar-rig (and trocar-plant for a simulated one), or give --domain",
+      entities_->participant.domain(), wire::reach() == wire::Reach::Secured ? " that has keys of the authority in TROCAR_KEYS" : ""));
 }
 
 void RigClient::send(const Command& command, const std::string& gain_set) {

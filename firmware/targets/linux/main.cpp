@@ -15,6 +15,7 @@
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/wire/dds.hpp"
 #include "firmware/bridge/bridge.hpp"
 #include "firmware/controller/controller.hpp"
 #include "firmware/model_watch/model_watch.hpp"
@@ -39,6 +40,7 @@ struct Options {
   int priority = 80;
   std::int64_t domain = -1;
   std::string model;
+  bool open_network{};
 };
 
 // Everything of fixed size that the loop uses, in one block that the memory lock covers.
@@ -113,6 +115,11 @@ int run(const Options& options) {
   if (!options.model.empty())
     model.emplace(options.model, needle, [](const std::string& line) { fmt::print(stderr, "trocar-rig: {}\n", line); });
 
+  if (wire::reach() == wire::Reach::Open && !options.open_network)
+    throw config::UserError(
+        "CYCLONEDDS_URI opens DDS to a network on which whoever is there may command this rig: unset it, name keys in TROCAR_KEYS (trocar "
+        "keys "
+        "makes them), or add --open-network where nobody else can be");
   bridge::Bridge bridge(p.rig, p.mail, p.shared);
   rt::Setup setup;
   setup.apply({options.priority, options.cpu});
@@ -152,6 +159,7 @@ int main(int argc, char** argv) {
   app.add_option("--domain", options.domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
   app.add_option("--cpu", options.cpu, "core to run on")->check(CLI::NonNegativeNumber);
   app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
+  app.add_flag("--open-network", options.open_network, "accept a network without keys (CYCLONEDDS_URI set, TROCAR_KEYS not)");
   app.add_flag("--best-effort", options.best_effort, "go on when the machine refuses part of the real-time set-up");
   app.add_flag("--die-with-parent", die_with_parent, "stop orderly when the process that started this one ends");
   try {
