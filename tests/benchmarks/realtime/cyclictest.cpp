@@ -29,7 +29,7 @@ std::int64_t number_after(const std::string& text, const std::string& label) {
 
 }  // namespace
 
-Cyclictest::Cyclictest(int interval_us, int seconds, bool fifo, std::filesystem::path file) : file_(std::move(file)) {
+Cyclictest::Cyclictest(int interval_us, int seconds, bool fifo, int core, std::filesystem::path file) : file_(std::move(file)) {
   std::vector<std::string> word{"cyclictest",
                                 "--quiet",
                                 "--threads=1",
@@ -38,6 +38,7 @@ Cyclictest::Cyclictest(int interval_us, int seconds, bool fifo, std::filesystem:
                                 fmt::format("--duration={}", seconds),
                                 fmt::format("--histogram={}", histogram_us)};
   word.push_back(fifo ? fmt::format("--priority={}", hal::realtime::Request{}.priority) : std::string("--policy=other"));
+  if (core >= 0) word.push_back(fmt::format("--affinity={}", core));
   std::vector<char*> argument;
   for (std::string& each : word) argument.push_back(each.data());
   argument.push_back(nullptr);

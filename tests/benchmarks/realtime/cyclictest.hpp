@@ -19,9 +19,9 @@ struct CyclictestResult {
 
 class Cyclictest {
  public:
-  // Starts it with this interval, under SCHED_FIFO with the priority of our own thread or under the ordinary scheduler. Its output goes to
-  // `file`. Throws nothing: result() says why it did not run.
-  Cyclictest(int interval_us, int seconds, bool fifo, std::filesystem::path file);
+  // Starts it with this interval on this core (-1: any), under SCHED_FIFO with the priority of our own thread or under the ordinary
+  // scheduler. Its output goes to `file`. Throws nothing: result() says why it did not run.
+  Cyclictest(int interval_us, int seconds, bool fifo, int core, std::filesystem::path file);
   Cyclictest(const Cyclictest&) = delete;
   Cyclictest& operator=(const Cyclictest&) = delete;
   ~Cyclictest();

@@ -19,7 +19,7 @@ set datafile separator ','
 set terminal svg size 1000,720 font 'sans,14' background 'white'
 set grid
 set logscale xy
-set yrange [0.5:*]
+set yrange [0.5:3e5]
 set xrange [5:30000]
 set key inside top right
 csv = folder.'/realtime_histogram.csv'

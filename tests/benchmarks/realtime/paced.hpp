@@ -12,6 +12,12 @@
 
 namespace trocar::bench {
 
+// Ours and cyclictest's, so that neither runs in the other's way; -1 for both where only one core may be used.
+struct Cores {
+  int ours{-1}, other{-1};
+};
+[[nodiscard]] Cores cores();
+
 // Nanoseconds. A tick of a course does the same in every execution.
 struct Tick {
   std::int64_t late_ns{};   // wake-up against the schedule
