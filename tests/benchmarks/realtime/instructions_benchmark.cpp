@@ -202,13 +202,15 @@ int run_under_valgrind(const Options& options) {
         "counting under valgrind failed, or the course was not what it should be (left Haptic, or a step without solution)");
   }
   std::string table = "tick_hz,tick,contacts,newton,solves,pivots,instructions\n";
-  fmt::print("Instructions of controller.tick, by callgrind, in lock-step, one cycle; in-process drives\n");
+  std::string text = "Instructions of controller.tick, by callgrind, in lock-step, each tick of one cycle; in-process drives\n";
   for (const std::filesystem::path& rate : rates) {
     std::ifstream stream(rate / "ticks.csv");
     table.append(std::istreambuf_iterator<char>(stream), {});
-    fmt::print("{}", describe(read_ticks(rate / "ticks.csv"), rate));
+    text += describe(read_ticks(rate / "ticks.csv"), rate);
   }
+  fmt::print("{}", text);
   write_file(options.out / "instructions.csv", table);
+  write_file(options.out / "instructions.txt", text);
   std::filesystem::remove_all(folder);
   report::run_gnuplot(figure, options.out);
   fmt::print("tables and figures: {}\n", options.out.string());
