@@ -17,8 +17,7 @@ namespace trocar::bench {
 namespace {
 
 constexpr std::uint64_t session = 1;
-constexpr double observer_rad_s = 390.0, observer_error_n = 0.6;  // as in the controller; tests/benchmarks/observer
-constexpr int cycles = 9;                                         // more than 60 s
+constexpr int cycles = 9;  // more than 60 s
 const std::filesystem::path share(TROCAR_SHARE);
 
 rig::Rig rig_at(double tick_hz) {
@@ -26,8 +25,7 @@ rig::Rig rig_at(double tick_hz) {
   rig.timing.tick_hz = tick_hz;
   // How late the machine is, is what is measured here; it must not end the measurement.
   rig.timing.late_tick_best_effort_us = 60'000'000;
-  const auto config = control::force_observer_config(rig, control::ObserverKind::Nicosia, observer_rad_s);
-  const control::Admission admission = control::admit(config, rig, observer_error_n);
+  const control::Admission admission = control::admit(rig);
   if (admission.verdict != control::Admissible::Yes)
     throw std::runtime_error(
         fmt::format("the force observer is not admissible at {} Hz: {}", tick_hz, control::to_text(admission.verdict)));
@@ -72,6 +70,7 @@ void compile_model(const std::filesystem::path& file) {
 Course::Course(double tick_hz, const model::Image& image)
     : rig_(rig_at(tick_hz)),
       period_ns_(static_cast<std::int64_t>(1e9 / tick_hz)),
+      needle_({rig_.haptic.fade_s}),
       plant_(rig_, plant_config(), air(), 1),
       hand_(arm(), homing_pose(rig_)),
       gate_(rig_) {
