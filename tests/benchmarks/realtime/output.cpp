@@ -172,7 +172,7 @@ void print(const Rate& rate) {
   const Blame b = blame(rate);
   fmt::print("\nticks longer than half a period: {}; of them interrupted (little CPU time, or an involuntary switch): {};\n", b.slow,
              b.preempted);
-  fmt::print("  not slow when executed again, so the machine's: {}; slow every time, so ours: {}\n", b.not_again, b.ours);
+  fmt::print("  not when executed again, so not for what they compute: {}; every time, so ours: {}\n", b.not_again, b.ours);
   fmt::print("later than a whole period: {} ticks; missed periods: {}; stolen from this virtual machine's cores: {:.2f} s\n", m.late,
              p.missed_periods, p.steal_s);
 }
