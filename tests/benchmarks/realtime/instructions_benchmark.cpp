@@ -63,6 +63,7 @@ int count_ticks(const Options& options) {
   std::string table;
   std::int64_t worst = 0;
   bool sound = true;
+  CALLGRIND_START_INSTRUMENTATION;
   for (int k = 0; k < ticks; ++k) {
     const controller::TickInput input = course->begin(0);
     CALLGRIND_TOGGLE_COLLECT;
@@ -179,6 +180,7 @@ int run_under_valgrind(const Options& options) {
     std::vector<std::string> command{"valgrind",
                                      "-q",
                                      "--tool=callgrind",
+                                     "--instr-atstart=no",  // the way to Haptic is long
                                      "--collect-atstart=no",
                                      "--callgrind-out-file=" + (rates.back() / "dump").string(),
                                      std::filesystem::canonical("/proc/self/exe").string(),
