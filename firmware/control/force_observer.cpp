@@ -185,9 +185,9 @@ const char* to_text(Admissible verdict) noexcept {
     case Admissible::TooFastForTick:
       return "too high for the tick; lower it";
     case Admissible::TooSlowForSpeed:
-      return "too low for the speeds that the limits allow; raise it, or take kind = \"momentum\"";
+      return "too low for the speeds that the limits allow; raise it, or take the momentum observer";
     case Admissible::FrictionTooSteep:
-      return "too low for the joints' friction; raise it, or take kind = \"momentum\"";
+      return "too low for the joints' friction; raise it, or take the momentum observer";
     case Admissible::EncoderTooCoarse:
       return "too high for the encoder; lower it, or allow more in count_force_n";
   }

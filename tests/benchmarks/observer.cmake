@@ -1,7 +1,7 @@
 trocar_library(tests/benchmarks/observer
   SOURCES course.cpp judge.cpp output.cpp times.cpp
-  DEPENDS firmware_control common_core common_mechanism common_rig sim_plant_mechanism
-  PRIVATE_DEPENDS tests_benchmarks_program tests_benchmarks_contact fmt::fmt host_report)
+  DEPENDS firmware_control common_core common_mechanism common_rig sim_plant_mechanism sim_plant_plant
+  PRIVATE_DEPENDS sim_plant_bench sim_plant_hand sim_plant_wired firmware_controller tests_benchmarks_program tests_benchmarks_contact fmt::fmt host_report)
 trocar_program(observer_benchmark SOURCES observer/observer_benchmark.cpp
   DEPENDS tests_benchmarks_observer common_config sim_plant_plant tests_benchmarks_program fmt::fmt)
 target_compile_definitions(observer_benchmark PRIVATE TROCAR_SHARE="${CMAKE_SOURCE_DIR}/host/share")

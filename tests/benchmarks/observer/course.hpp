@@ -7,6 +7,7 @@
 
 #include "common/rig/rig.hpp"
 #include "sim_plant/mechanism/twin_body.hpp"
+#include "sim_plant/plant/config.hpp"
 
 namespace trocar::bench {
 
@@ -46,5 +47,10 @@ struct Course {
 
 // Throws std::runtime_error when the handle is caught at a singularity or stopped.
 [[nodiscard]] Course record(const rig::Rig& rig, const Machine& machine, double tick_s);
+
+// The same pushes in the lock-step bench: the controller's own position control holds the handle, and counts and torques go over the
+// drives' bus, a tick late. Force, speed and tracking limits are wide, so that they do not end it. Throws std::runtime_error when something
+// does.
+[[nodiscard]] Course record_on_bus(rig::Rig rig, const sim_plant::PlantConfig& plant);
 
 }  // namespace trocar::bench

@@ -1,6 +1,6 @@
 // The force observers of firmware/control against plain inverse dynamics on ubc_twin_haptic: force error and step response over bandwidth,
-// with encoders of 16,000 counts and friction, at 1 and 4 kHz. Exit code 1 when the Nicosia observer misses 0.6 N and 10 ms on the machine
-// as modelled at 1 kHz at every admissible bandwidth.
+// with encoders of 16,000 counts and friction, at 1 and 4 kHz, and over the real bus protocol in the lock-step bench. Exit code 1 when the
+// Nicosia observer misses 0.6 N and 10 ms at the shipped rig's bandwidth, on the machine as modelled at 1 kHz or in the bench.
 //   observer_benchmark [--out FOLDER] [--quick]
 #include <fmt/core.h>
 
@@ -98,14 +98,23 @@ int run(const Options& options) {
       fmt::print("handle up to {:.2f} m/s, motors up to {:.2f} N m\n", course.fastest_m_s, course.most_torque_nm);
       if (rows.size() == methods.size() * bandwidths.size()) print_times(course, rig, options.quick ? 3 : 20);
     }
+  {
+    fmt::print(stderr, "observer_benchmark: in the lock-step bench …\n");
+    const Course course = record_on_bus(rig, sim_plant::read_plant(share / "plants/ubc_twin_haptic.toml"));
+    run_course(course, rig, bandwidths, rows);
+    print(rows, course.machine, 1000.0);
+    fmt::print("handle up to {:.2f} m/s, motors up to {:.2f} N m\n", course.fastest_m_s, course.most_torque_nm);
+  }
   print_summary(rows);
   write(options.out, rows, trace);
   fmt::print("\ntables and figures: {}\n", options.out.string());
+  int met = 0;
   for (const Trial& r : rows)
-    if (r.machine == "as modelled" && r.method == "nicosia" && r.tick_hz == 1000.0 && r.met() &&
-        r.admission.verdict == control::Admissible::Yes)
-      return 0;
-  return 1;
+    met += (r.machine == "as modelled" || r.machine == "on the bus") && r.method == "nicosia" && r.tick_hz == 1000.0 &&
+                   r.bandwidth_rad_s == rig.haptic.observer_bandwidth_rad_s && r.met() && r.admission.verdict == control::Admissible::Yes
+               ? 1
+               : 0;
+  return met == 2 ? 0 : 1;
 }
 
 }  // namespace
