@@ -14,6 +14,7 @@
 
 #include "common/core/capacities.hpp"
 #include "common/rig/rig.hpp"
+#include "hal/can/bits.hpp"
 #include "hal/can/bus.hpp"
 #include "hal/canopen/master.hpp"
 #include "hal/output_gate.hpp"
@@ -75,6 +76,15 @@ struct LinkCounters {
   BusCounters sensor_bus{};
 };
 
+// How the buses are doing, for people; small enough to be copied in every tick.
+struct BusReport {
+  BusLoad drives_load{};  // since the start, as is the next
+  BusLoad sensor_load{};
+  std::uint64_t ticks{};
+  BusCondition drives{};
+  BusCondition sensor{};
+};
+
 template <CanBus Bus>
 class RigLink {
  public:
@@ -98,15 +108,17 @@ class RigLink {
     counters_.late_feedback += fresh_drives() - fresh_before;
     if (open_tick_) {
       ++counters_.missed_ends;
-      drives_.send(torque_frame({}), now_ns);
+      send(drives_, torque_frame({}), now_ns);
     }
-    ++counters_.ticks;
+    bus_report_.drives_load.end_tick();
+    bus_report_.sensor_load.end_tick();
+    bus_report_.ticks = ++counters_.ticks;
     open_tick_ = true;
     master_.clear_fresh();
     sensor_fresh_ = false;
-    drives_.send(CanFrame{.id = canopen::cob_sync}, now_ns);
+    send(drives_, CanFrame{.id = canopen::cob_sync}, now_ns);
     drives_.flush(now_ns);
-    sensor_.send(ati_.request(), now_ns);
+    send(sensor_, ati_.request(), now_ns);
     sensor_.flush(now_ns);
     update();
   }
@@ -131,10 +143,10 @@ class RigLink {
     if (operational) counters_.missed_feedback += master_.drives() - fresh_drives();
     if (!sensor_fresh_) ++counters_.missed_sensor;
     const bool open = operational && command.request == DriveRequest::Enable && master_.all_enabled();
-    drives_.send(torque_frame(gate_.pass(command.joint_torque_nm, open)), now_ns);
+    send(drives_, torque_frame(gate_.pass(command.joint_torque_nm, open)), now_ns);
     const DriveRequest request = operational || command.request != DriveRequest::Enable ? command.request : DriveRequest::Disable;
     CanFrame further;
-    if (master_.next_frame(now_ns, request, command.reset_faults, further)) drives_.send(further, now_ns);
+    if (master_.next_frame(now_ns, request, command.reset_faults, further)) send(drives_, further, now_ns);
     drives_.flush(now_ns);
   }
 
@@ -157,14 +169,17 @@ class RigLink {
   // thread of the tick only (others: copy report(), then canopen::describe). Formats text: not for every tick.
   [[nodiscard]] const char* bring_up_step() noexcept {
     const auto print = [&](const char* line) { std::snprintf(text_.data(), text_.size(), "%s", line); };
-    if (bus_off_) {
-      print("the CAN controller of the drives bus is off the bus: check the cable, its terminators and the bit rate, then start again");
+    const BusCondition drives = bus_report_.drives;
+    if (drives == BusCondition::Off || (drives == BusCondition::Passive && !master_.operational())) {
+      std::snprintf(text_.data(), text_.size(), "the CAN controller of the drives bus is %s", to_string(drives));
     } else if (halted_) {
       print("shut down");
     } else if (!begun_) {
       print("not started");
     } else if (master_.blocking_drive() < master_.drives()) {
       canopen::describe(report(), text_);
+    } else if (bus_report_.sensor >= BusCondition::Passive) {
+      std::snprintf(text_.data(), text_.size(), "the CAN controller of the sensor bus is %s", to_string(bus_report_.sensor));
     } else if (ati_.readings() == 0) {
       std::snprintf(text_.data(), text_.size(),
                     "all drives run, but the force sensor does not answer to identifier %03Xh: check its supply, cable and base id",
@@ -181,6 +196,8 @@ class RigLink {
     return master_.drive(i < master_.drives() ? i : 0).report();
   }
 
+  [[nodiscard]] const BusReport& bus_report() const noexcept { return bus_report_; }
+
   [[nodiscard]] LinkCounters counters() const noexcept {
     LinkCounters all = counters_;
     all.gate = gate_.counters();
@@ -192,18 +209,28 @@ class RigLink {
   }
 
  private:
+  void send(Bus& bus, const CanFrame& frame, std::int64_t now_ns) noexcept {
+    if (bus.send(frame, now_ns)) (&bus == &drives_ ? bus_report_.drives_load : bus_report_.sensor_load).add(frame);
+  }
+
   // Bounded: a babbling node must not hold the tick.
   void drain(std::int64_t now_ns) noexcept {
     CanFrame frame;
     for (std::size_t n = 0; n < capacity::can_queue && drives_.receive(frame, now_ns); ++n) {
       if (frame.error) {
-        if ((frame.id & error_class_bus_off) != 0) bus_off_ = halted_ = true;
-      } else if (!master_.receive(frame, now_ns)) {
-        ++counters_.foreign_frames;
+        bus_report_.drives = condition_after(frame, bus_report_.drives);
+        if (bus_report_.drives == BusCondition::Off) halted_ = true;
+        continue;
       }
+      bus_report_.drives_load.add(frame);
+      if (!master_.receive(frame, now_ns)) ++counters_.foreign_frames;
     }
     for (std::size_t n = 0; n < capacity::can_queue && sensor_.receive(frame, now_ns); ++n) {
-      if (frame.error) continue;
+      if (frame.error) {
+        bus_report_.sensor = condition_after(frame, bus_report_.sensor);
+        continue;
+      }
+      bus_report_.sensor_load.add(frame);
       if (frame.id != sensor_base_id_ + 5 && frame.id != sensor_base_id_ + 6) {
         ++counters_.foreign_frames;
       } else if (ati_.receive(frame)) {
@@ -233,7 +260,7 @@ class RigLink {
       out.heartbeat_ok = drive.heartbeat_ok();
       out.emcy_code = drive.emergency_code();
     }
-    feedback_.bus_off = bus_off_;
+    feedback_.bus_off = bus_report_.drives == BusCondition::Off;
     feedback_.complete = !halted_ && fresh_drives() == master_.drives();
     feedback_.sensor.fresh = sensor_fresh_;
     if (sensor_fresh_) {
@@ -254,10 +281,10 @@ class RigLink {
   bool begun_{};
   bool open_tick_{};  // begun, not yet ended
   bool halted_{};
-  bool bus_off_{};
   bool sensor_fresh_{};
   Feedback feedback_{};
   LinkCounters counters_{};
+  BusReport bus_report_{};
   std::array<char, 384> text_{};
 };
 

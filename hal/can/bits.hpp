@@ -14,6 +14,27 @@ namespace trocar::hal {
 // Of this very frame.
 [[nodiscard]] std::uint32_t can_bits(const CanFrame& frame) noexcept;
 
+// Bit times counted on one bus, for its load: what one end has sent and received. Frames that the kernel filters out are not in it.
+class BusLoad {
+ public:
+  void add(const CanFrame& frame) noexcept {
+    const std::uint32_t bits = can_bits(frame);
+    bits_ += bits;
+    tick_bits_ += bits;
+  }
+  void end_tick() noexcept {
+    most_ = tick_bits_ > most_ ? tick_bits_ : most_;
+    tick_bits_ = 0;
+  }
+  [[nodiscard]] std::uint64_t bits() const noexcept { return bits_; }
+  [[nodiscard]] std::uint32_t most_in_a_tick() const noexcept { return most_; }
+
+ private:
+  std::uint64_t bits_{};
+  std::uint32_t tick_bits_{};
+  std::uint32_t most_{};
+};
+
 inline constexpr std::uint32_t intermission_bits = 3;  // the frame is valid for its receivers this much earlier
 
 }  // namespace trocar::hal

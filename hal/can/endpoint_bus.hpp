@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "common/rig/rig.hpp"
 #include "hal/can/bus.hpp"
@@ -14,9 +15,10 @@ enum class BusSide : std::uint8_t { Rig, Plant };  // which of the two UDP ports
 
 class EndpointBus {
  public:
-  [[nodiscard]] OpenStatus open(const rig::BusEndpoint& endpoint, BusSide side) noexcept {
+  // ids: what to receive from a CAN interface, see SocketCanBus; a tunnel has one peer, and all of its frames come.
+  [[nodiscard]] OpenStatus open(const rig::BusEndpoint& endpoint, BusSide side, std::span<const std::uint32_t> ids = {}) noexcept {
     is_socketcan_ = endpoint.interface[0] != '\0';
-    if (is_socketcan_) return socketcan_.open(endpoint.interface.data());
+    if (is_socketcan_) return socketcan_.open(endpoint.interface.data(), ids);
     return side == BusSide::Rig ? udp_.open(endpoint.host.data(), endpoint.rig_port, endpoint.plant_port)
                                 : udp_.open(endpoint.host.data(), endpoint.plant_port, endpoint.rig_port);
   }

@@ -3,21 +3,37 @@
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
+#include <linux/net_tstamp.h>
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 
 namespace trocar::hal {
-static_assert(error_class_bus_off == CAN_ERR_BUSOFF);
+namespace {
 
-OpenStatus SocketCanBus::open(const char* interface) noexcept {
+static_assert(error_class_controller == CAN_ERR_CRTL && error_class_no_acknowledge == CAN_ERR_ACK &&
+              error_class_bus_off == CAN_ERR_BUSOFF && error_class_restarted == CAN_ERR_RESTARTED);
+static_assert(controller_overflow == (CAN_ERR_CRTL_RX_OVERFLOW | CAN_ERR_CRTL_TX_OVERFLOW) &&
+              controller_warning == (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING) &&
+              controller_passive == (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE) && controller_active == CAN_ERR_CRTL_ACTIVE);
+
+using Stamps = std::array<timespec, 3>;  // struct scm_timestamping: the kernel's, an obsolete one, the hardware's
+
+constexpr std::int64_t nanoseconds(const timespec& time) noexcept { return time.tv_sec * 1'000'000'000 + time.tv_nsec; }
+
+}  // namespace
+
+OpenStatus SocketCanBus::open(const char* interface, std::span<const std::uint32_t> ids) noexcept {
   close();
+  overflowed_ = 0;
+  hardware_clock_ = {};
   OpenStatus status;
   const auto fail = [&](int error, const char* format, auto... values) {
     status.error_number = error == 0 ? EINVAL : error;
@@ -43,7 +59,21 @@ OpenStatus SocketCanBus::open(const char* interface) noexcept {
   const int on = 1;
   if (::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) != 0)
     return fail(errno, "CAN interface %s does not report errors: %s", interface, std::strerror(errno));
-  ::setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);  // without it, frames carry the time of the read
+  if (!ids.empty()) {
+    std::array<can_filter, CAN_RAW_FILTER_MAX> filter;
+    if (ids.size() > filter.size())
+      return fail(EINVAL, "CAN interface %s: a socket takes at most %d identifiers", interface, CAN_RAW_FILTER_MAX);
+    for (std::size_t i = 0; i < ids.size(); ++i) filter[i] = {ids[i], CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    if (::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FILTER, filter.data(), static_cast<socklen_t>(ids.size() * sizeof filter[0])) != 0)
+      return fail(errno, "CAN interface %s does not filter: %s", interface, std::strerror(errno));
+  }
+  // None of these three is needed for the frames themselves: counting CAN FD frames and losses, and the time of reception, without
+  // which frames carry the time of the read.
+  ::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
+  ::setsockopt(socket_, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+  const int stamps =
+      SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE | SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
+  ::setsockopt(socket_, SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof stamps);
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = index;
@@ -72,36 +102,55 @@ bool SocketCanBus::send(const CanFrame& frame, std::int64_t) noexcept {
 }
 
 bool SocketCanBus::receive(CanFrame& frame, std::int64_t now_ns) noexcept {
-  if (socket_ < 0) return false;
-  can_frame raw{};
-  iovec part{&raw, sizeof raw};
-  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))];
-  msghdr message{};
-  message.msg_iov = &part;
-  message.msg_iovlen = 1;
-  message.msg_control = control;
-  message.msg_controllen = sizeof control;
-  if (::recvmsg(socket_, &message, MSG_DONTWAIT) != static_cast<ssize_t>(sizeof raw)) {
-    if (errno != EAGAIN && errno != EWOULDBLOCK) counters_.last_error_number = errno;
-    return false;
+  constexpr int attempts = 64;  // a flood of CAN FD frames must not hold the caller
+  for (int i = 0; i < attempts && socket_ >= 0; ++i) {
+    canfd_frame raw{};  // its beginning is laid out as a classic frame
+    iovec part{&raw, sizeof raw};
+    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(Stamps)) + CMSG_SPACE(sizeof overflowed_)];
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control;
+    message.msg_controllen = sizeof control;
+    const ssize_t size = ::recvmsg(socket_, &message, MSG_DONTWAIT);
+    if (size != CAN_MTU && size != CANFD_MTU) {
+      if (size < 0 && errno != EAGAIN && errno != EWOULDBLOCK) counters_.last_error_number = errno;
+      return false;
+    }
+    std::int64_t age_ns = 0;
+    for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr; header = CMSG_NXTHDR(&message, header)) {
+      if (header->cmsg_level != SOL_SOCKET) continue;
+      if (header->cmsg_type == SO_RXQ_OVFL) {
+        std::uint32_t overflowed = 0;
+        std::memcpy(&overflowed, CMSG_DATA(header), sizeof overflowed);
+        counters_.receive_dropped += overflowed - overflowed_;
+        overflowed_ = overflowed;
+      } else if (header->cmsg_type == SCM_TIMESTAMPING) {
+        Stamps stamp{};
+        timespec current{};
+        std::memcpy(&stamp, CMSG_DATA(header), sizeof stamp);
+        ::clock_gettime(CLOCK_REALTIME, &current);
+        const std::int64_t kernel_ns = nanoseconds(stamp[0]);
+        const std::int64_t hardware_ns = nanoseconds(stamp[2]);
+        age_ns = nanoseconds(current) - (hardware_ns == 0 ? kernel_ns : hardware_clock_.carry_over(hardware_ns, kernel_ns));
+      }
+    }
+    if (size == CANFD_MTU) {
+      ++counters_.unsupported;
+      continue;
+    }
+    frame = {};
+    frame.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
+    frame.remote = (raw.can_id & CAN_RTR_FLAG) != 0;
+    frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
+    frame.id = raw.can_id & CAN_EFF_MASK;
+    frame.length = raw.len <= 8 ? raw.len : std::uint8_t{8};
+    std::memcpy(frame.data.data(), raw.data, frame.data.size());
+    frame.stamp_ns = now_ns - age_ns;
+    count_received(counters_, frame);
+    return true;
   }
-  frame = {};
-  frame.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
-  frame.remote = (raw.can_id & CAN_RTR_FLAG) != 0;
-  frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
-  frame.id = raw.can_id & CAN_EFF_MASK;
-  frame.length = raw.can_dlc <= 8 ? raw.can_dlc : std::uint8_t{8};
-  std::memcpy(frame.data.data(), raw.data, sizeof raw.data);
-  frame.stamp_ns = now_ns;
-  const cmsghdr* header = CMSG_FIRSTHDR(&message);
-  if (header != nullptr && header->cmsg_level == SOL_SOCKET && header->cmsg_type == SCM_TIMESTAMPNS) {
-    timespec received{}, current{};
-    std::memcpy(&received, CMSG_DATA(header), sizeof received);
-    ::clock_gettime(CLOCK_REALTIME, &current);
-    frame.stamp_ns -= (current.tv_sec - received.tv_sec) * 1'000'000'000 + (current.tv_nsec - received.tv_nsec);
-  }
-  count_received(counters_, frame);
-  return true;
+  return false;
 }
 
 }  // namespace trocar::hal

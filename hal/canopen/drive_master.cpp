@@ -170,6 +170,7 @@ void DriveMaster::supervise(std::int64_t now_ns) noexcept {
 }
 
 bool DriveMaster::bring_up_frame(std::int64_t now_ns, bool may_start, CanFrame& frame) noexcept {
+  if (sdo_.next_frame(frame, now_ns)) return true;
   switch (report_.phase) {
     case DrivePhase::Reset:
       frame = nmt_frame(NmtCommand::ResetCommunication, node_);

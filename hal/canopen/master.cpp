@@ -8,6 +8,16 @@ namespace {
 constexpr std::uint8_t foreign = capacity::drives;
 }
 
+ReceivedIds received_ids(const rig::Rig& rig) noexcept {
+  ReceivedIds ids;
+  for (std::size_t i = 0; i < rig.drives(); ++i) {
+    const std::uint8_t node = rig.buses.drive_node[i];
+    for (const std::uint32_t id : {cob_emergency(node), cob_feedback(node), cob_sdo_response(node), cob_heartbeat(node)})
+      ids.id[ids.count++] = id;
+  }
+  return ids;
+}
+
 Master::Master(const rig::Rig& rig) noexcept
     : drives_{rig.drives()}, node_{rig.buses.master_node}, heartbeat_period_ns_{rig.timing.heartbeat_ms * ns_per_ms} {
   drive_of_node_.fill(foreign);
@@ -21,11 +31,11 @@ bool Master::receive(const CanFrame& frame, std::int64_t now_ns) noexcept {
   if (frame.extended || frame.remote || frame.error) return false;
   const std::uint8_t i = drive_of_node_[frame.id & 0x7Fu];
   if (i == foreign) return false;
-  switch (frame.id & 0x780u) {
-    case 0x080u:
-    case 0x180u:
-    case 0x580u:
-    case 0x700u:
+  switch (frame.id & 0x780u) {  // received_ids() has the same four
+    case cob_emergency(0):
+    case cob_feedback(0):
+    case cob_sdo_response(0):
+    case cob_heartbeat(0):
       drive_[i].receive(frame, now_ns);
       return true;
     default:

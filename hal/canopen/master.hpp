@@ -16,6 +16,14 @@ namespace trocar::hal::canopen {
 inline constexpr std::int64_t reset_window_ns =
     100 * ns_per_ms;  // one reset request is tried for so long: a reset takes two frames a drive
 
+// Identifiers of all frames that a master of this rig listens to.
+struct ReceivedIds {
+  std::array<std::uint32_t, 4 * capacity::drives> id{};
+  std::size_t count{};
+  [[nodiscard]] std::span<const std::uint32_t> all() const noexcept { return std::span{id}.first(count); }
+};
+[[nodiscard]] ReceivedIds received_ids(const rig::Rig& rig) noexcept;
+
 class Master {
  public:
   explicit Master(const rig::Rig& rig) noexcept;

@@ -36,6 +36,13 @@ enum class NmtState : std::uint8_t { BootUp = 0x00, Stopped = 0x04, Operational 
   frame.data[0] = static_cast<std::uint8_t>(state);
   return frame;
 }
+// Node guarding: the answer to a remote frame of the heartbeat's identifier; the toggle bit alternates from 0.
+inline constexpr std::uint8_t guard_toggle = 0x80;
+[[nodiscard]] constexpr CanFrame guarding_frame(std::uint8_t node, NmtState state, std::uint8_t toggle) noexcept {
+  CanFrame frame = heartbeat_frame(node, state);
+  frame.data[0] = static_cast<std::uint8_t>(frame.data[0] | toggle);
+  return frame;
+}
 
 // --- objects
 struct Object {
@@ -52,17 +59,23 @@ namespace object {
 inline constexpr Object dummy_int16{0x0003, 0, 2};  // place holder in a mapping
 inline constexpr Object device_type{0x1000, 0, 4};
 inline constexpr Object error_register{0x1001, 0, 1};
+inline constexpr Object error_count{0x1003, 0, 1};  // the errors follow in the next subindices
 inline constexpr Object sync_id{0x1005, 0, 4};
+inline constexpr Object guard_time{0x100C, 0, 2};  // ms
+inline constexpr Object life_time_factor{0x100D, 0, 1};
+inline constexpr Object emergency_id{0x1014, 0, 4};
 inline constexpr Object consumer_heartbeat{0x1016, 1, 4};  // (node << 16) | ms
 inline constexpr Object producer_heartbeat{0x1017, 0, 2};  // ms
 inline constexpr Object vendor{0x1018, 1, 4};
 inline constexpr Object product{0x1018, 2, 4};
+inline constexpr Object error_behaviour{0x1029, 1, 1};  // on a communication error: 0 pre-operational, 1 no change, 2 stopped
 // Communication (1400h, 1800h) and mapping (1600h, 1A00h) entries of one PDO
 inline constexpr std::uint16_t torque_rpdo = 0x1400, torque_rpdo_map = 0x1600;
 inline constexpr std::uint16_t controlword_rpdo = 0x1401, controlword_rpdo_map = 0x1601;
 inline constexpr std::uint16_t feedback_tpdo = 0x1800, feedback_tpdo_map = 0x1A00;
 [[nodiscard]] constexpr Object pdo_id(std::uint16_t pdo) noexcept { return {pdo, 1, 4}; }
 [[nodiscard]] constexpr Object pdo_transmission(std::uint16_t pdo) noexcept { return {pdo, 2, 1}; }
+[[nodiscard]] constexpr Object pdo_inhibit(std::uint16_t pdo) noexcept { return {pdo, 3, 2}; }  // 100 us
 [[nodiscard]] constexpr Object pdo_event_ms(std::uint16_t pdo) noexcept { return {pdo, 5, 2}; }
 [[nodiscard]] constexpr Object map_count(std::uint16_t map) noexcept { return {map, 0, 1}; }
 [[nodiscard]] constexpr Object map_entry(std::uint16_t map, std::uint8_t place /* 1 … */) noexcept { return {map, place, 4}; }
@@ -81,6 +94,7 @@ inline constexpr Object torque{0x6077, 0, 2};
 inline constexpr Object rated_torque{0x6076, 0, 4};  // mN m
 }  // namespace object
 
+inline constexpr std::uint32_t behaviour_pre_operational = 0, behaviour_stopped = 2;  // of error_behaviour
 inline constexpr std::uint8_t transmission_every_sync = 1;
 inline constexpr std::uint8_t transmission_event = 255;
 inline constexpr std::uint8_t mode_cyclic_torque = 10;

@@ -11,15 +11,13 @@ using hal::canopen::DriveState;
 using hal::canopen::NmtCommand;
 using hal::canopen::NmtState;
 using hal::canopen::Object;
-using hal::canopen::SdoAbort;
-using hal::canopen::SdoKind;
-using hal::canopen::SdoMessage;
 namespace co = hal::canopen;
 namespace object = hal::canopen::object;
 
 namespace {
 
 constexpr std::int64_t ns_per_ms = 1'000'000;
+constexpr std::int64_t ns_per_100_us = 100'000;
 constexpr std::uint16_t emcy_pdo_length = 0x8210;
 constexpr std::uint8_t error_generic = 0x01;
 constexpr std::uint8_t error_communication = 0x10;
@@ -68,32 +66,57 @@ DriveNode::DriveNode(const DriveNodeConfig& config) noexcept
       objects_{{.node = config.node,
                 .rated_torque_mnm = static_cast<std::uint32_t>(std::lround(1000.0 * config.rated_torque_nm)),
                 .peak_torque_permille = static_cast<std::uint16_t>(permille(config.peak_torque_nm, config.rated_torque_nm))}},
-      position_counts_{config.position_offset_counts} {}
+      sdo_{config.node},
+      position_counts_{config.position_offset_counts} {
+  configure_pdos();
+  configure_services();
+}
 
 void DriveNode::receive(const CanFrame& frame, std::int64_t now_ns) noexcept {
-  if (frame.extended || frame.remote || frame.error || nmt_ == NmtState::BootUp) return;
-  if (frame.id == co::cob_nmt) {
-    nmt_command(frame, now_ns);
+  if (frame.extended || frame.error || nmt_ == NmtState::BootUp) return;
+  if (frame.remote) {
+    answer_remote(frame, now_ns);
     return;
   }
-  const std::uint32_t watched = objects_.get(object::consumer_heartbeat);
-  if (frame.id == co::cob_heartbeat(static_cast<std::uint8_t>((watched >> 16) & 0x7F)) && (watched >> 16) != 0 && frame.length == 1) {
-    master_watched_ = (watched & 0xFFFF) != 0;
+  if (frame.id == co::cob_nmt) {
+    nmt_command(frame);
+    return;
+  }
+  if (frame.id == watched_id_ && frame.length == 1) {
+    master_watched_ = watched_ns_ > 0;
     master_heard_ns_ = now_ns;
     return;
   }
   if (nmt_ == NmtState::Stopped) return;
   if (frame.id == co::cob_sdo_request(config_.node)) {
-    if (frame.length == 8) serve_sdo(frame, now_ns);
+    publish();
+    const SdoServer::Outcome outcome = sdo_.receive(frame, objects_, now_ns);
+    counters_.sdo_aborts = sdo_.aborts();
+    if (outcome.answer) put(*outcome.answer);
+    if (outcome.written) object_written(*outcome.written, now_ns);
     return;
   }
   if (nmt_ != NmtState::Operational) return;
-  if (frame.id == (objects_.get(object::sync_id) & co::cob_mask))
+  if (frame.id == sync_id_) {
     synchronise(now_ns);
-  else if (frame.id == torque_rpdo_.id)
-    accept_rpdo(torque_rpdo_, frame, now_ns);
-  else if (frame.id == controlword_rpdo_.id)
-    accept_rpdo(controlword_rpdo_, frame, now_ns);
+    return;
+  }
+  for (Rpdo& pdo : rpdo_)
+    if (frame.id == pdo.id) accept_rpdo(pdo, frame, now_ns);
+}
+
+void DriveNode::answer_remote(const CanFrame& frame, std::int64_t now_ns) noexcept {
+  // Node guarding and heartbeats exclude each other (CiA 301, 7.2.8.3.2).
+  if (frame.id == co::cob_heartbeat(config_.node) && period_ns_ == 0) {
+    put(co::guarding_frame(config_.node, nmt_, guard_toggle_));
+    guard_toggle_ ^= co::guard_toggle;
+    guarded_ = true;
+    guarded_ns_ = now_ns;
+    return;
+  }
+  if (nmt_ != NmtState::Operational) return;
+  for (Tpdo& pdo : tpdo_)
+    if (frame.id == pdo.id) send_tpdo(pdo, fill(pdo), now_ns);  // pdo_no_remote keeps the others from being equal
 }
 
 void DriveNode::advance(std::int64_t now_ns) noexcept {
@@ -102,23 +125,42 @@ void DriveNode::advance(std::int64_t now_ns) noexcept {
     nmt_ = NmtState::PreOperational;
     next_heartbeat_ns_ = now_ns;
   }
-  const std::int64_t watched_ns = (objects_.get(object::consumer_heartbeat) & 0xFFFF) * ns_per_ms;
-  if (master_watched_ && now_ns - master_heard_ns_ >= watched_ns) {
-    master_watched_ = false;  // until its next heartbeat
-    ++counters_.heartbeats_lost;
-    connection_lost(co::emcy_heartbeat);
-    if (nmt_ == NmtState::Operational) nmt_ = NmtState::PreOperational;  // CiA 301, error behaviour (1029h) by default
+  supervise_master(now_ns);
+  if (state_ == DriveState::OperationEnabled) {
+    for (const Rpdo& pdo : rpdo_) {
+      if (pdo.deadline_ns == 0 || (pdo.id & co::pdo_invalid) != 0 || now_ns - pdo.heard_ns < pdo.deadline_ns) continue;
+      ++counters_.rpdo_timeouts;
+      trigger_fault(co::emcy_rpdo_timeout);
+      break;
+    }
   }
-  const std::int64_t rpdo_ns = objects_.get(object::pdo_event_ms(object::torque_rpdo)) * ns_per_ms;
-  if (state_ == DriveState::OperationEnabled && rpdo_ns > 0 && now_ns - last_torque_rpdo_ns_ >= rpdo_ns) {
-    ++counters_.rpdo_timeouts;
-    trigger_fault(co::emcy_rpdo_timeout);
-  }
-  const std::int64_t period_ns = objects_.get(object::producer_heartbeat) * ns_per_ms;
-  if (period_ns > 0 && now_ns >= next_heartbeat_ns_) {
+  if (const auto abort = sdo_.advance(now_ns)) put(*abort);
+  if (nmt_ == NmtState::Operational) send_events(now_ns);
+  if (period_ns_ > 0 && now_ns >= next_heartbeat_ns_) {
     put(co::heartbeat_frame(config_.node, nmt_));
-    next_heartbeat_ns_ = now_ns < next_heartbeat_ns_ + period_ns ? next_heartbeat_ns_ + period_ns : now_ns + period_ns;
+    next_heartbeat_ns_ = now_ns < next_heartbeat_ns_ + period_ns_ ? next_heartbeat_ns_ + period_ns_ : now_ns + period_ns_;
   }
+}
+
+void DriveNode::supervise_master(std::int64_t now_ns) noexcept {
+  if (master_watched_ && now_ns - master_heard_ns_ >= watched_ns_) {
+    master_watched_ = false;  // until its next heartbeat
+    master_lost();
+  }
+  if (guarded_ && life_ns_ > 0 && now_ns - guarded_ns_ >= life_ns_) {
+    guarded_ = false;  // until the next request
+    master_lost();
+  }
+}
+
+void DriveNode::master_lost() noexcept {
+  ++counters_.heartbeats_lost;
+  connection_lost(co::emcy_heartbeat);
+  const std::uint32_t behaviour = objects_.get(object::error_behaviour);
+  if (behaviour == co::behaviour_stopped)
+    go_to(NmtState::Stopped);
+  else if (behaviour == co::behaviour_pre_operational && nmt_ == NmtState::Operational)
+    go_to(NmtState::PreOperational);
 }
 
 bool DriveNode::transmit(CanFrame& frame) noexcept { return outgoing_.pop(frame); }
@@ -161,24 +203,33 @@ void DriveNode::restart() noexcept {
 void DriveNode::reboot() noexcept {
   outgoing_.clear();
   nmt_ = NmtState::BootUp;
-  master_watched_ = false;
-  torque_rpdo_.has_pending = controlword_rpdo_.has_pending = false;
+  master_watched_ = guarded_ = false;
+  guard_toggle_ = 0;
+  sdo_.reset();
   configure_pdos();
+  configure_services();
 }
 
-void DriveNode::nmt_command(const CanFrame& frame, std::int64_t) noexcept {
+void DriveNode::go_to(NmtState state) noexcept {
+  const bool starts = state == NmtState::Operational && nmt_ != state;
+  nmt_ = state;
+  if (state == NmtState::Stopped) sdo_.reset();
+  if (state == NmtState::Operational && !starts) return;
+  for (Rpdo& pdo : rpdo_) pdo.has_pending = false;
+  for (Tpdo& pdo : tpdo_) pdo.sent = false;
+}
+
+void DriveNode::nmt_command(const CanFrame& frame) noexcept {
   if (frame.length != 2 || (frame.data[1] != 0 && frame.data[1] != config_.node)) return;
   const auto command = static_cast<NmtCommand>(frame.data[0]);
   switch (command) {
     case NmtCommand::Start:
-      nmt_ = NmtState::Operational;
-      configure_pdos();
+      go_to(NmtState::Operational);
       return;
     case NmtCommand::Stop:
     case NmtCommand::PreOperational:
       if (state_ == DriveState::OperationEnabled) connection_lost(co::emcy_communication);
-      nmt_ = command == NmtCommand::Stop ? NmtState::Stopped : NmtState::PreOperational;
-      torque_rpdo_.has_pending = controlword_rpdo_.has_pending = false;
+      go_to(command == NmtCommand::Stop ? NmtState::Stopped : NmtState::PreOperational);
       return;
     case NmtCommand::ResetCommunication:
       if (state_ == DriveState::OperationEnabled) connection_lost(co::emcy_communication);
@@ -191,39 +242,11 @@ void DriveNode::nmt_command(const CanFrame& frame, std::int64_t) noexcept {
   }
 }
 
-void DriveNode::serve_sdo(const CanFrame& frame, std::int64_t now_ns) noexcept {
-  const SdoMessage request = co::decode_sdo_request(frame);
-  Object target = request.object;
-  std::uint32_t value = request.value;
-  std::optional<SdoAbort> refusal;
-  CanFrame answer;
-  switch (request.kind) {
-    case SdoKind::Upload:
-      publish();
-      refusal = objects_.read(target, value);
-      answer = co::sdo_upload_answer(config_.node, target, value);
-      break;
-    case SdoKind::Download:
-      refusal = objects_.write(target, value);
-      answer = co::sdo_download_answer(config_.node, target);
-      break;
-    case SdoKind::Abort:
-    case SdoKind::None:
-      return;
-    case SdoKind::Other:
-      refusal = SdoAbort::UnknownCommand;
-      break;
-  }
-  if (refusal) {
-    ++counters_.sdo_aborts;
-    answer = co::sdo_abort(co::cob_sdo_response(config_.node), target, static_cast<std::uint32_t>(*refusal));
-  }
-  put(answer);
-  if (!refusal && request.kind == SdoKind::Download) object_written(target, now_ns);
-}
-
 void DriveNode::object_written(Object written, std::int64_t now_ns) noexcept {
-  if (written.index >= 0x1400 && written.index < 0x1C00) configure_pdos();
+  if (written.index >= 0x1400 && written.index < 0x1C00)
+    configure_pdos();
+  else if (written.index < 0x2000)
+    configure_services();
   if (written == object::producer_heartbeat) next_heartbeat_ns_ = now_ns;
   if (written == object::consumer_heartbeat) master_watched_ = false;
   if (written == object::mode) objects_.set(object::mode_display, objects_.get(object::mode));
@@ -231,18 +254,70 @@ void DriveNode::object_written(Object written, std::int64_t now_ns) noexcept {
 }
 
 void DriveNode::configure_pdos() noexcept {
-  const auto load_rpdo = [&](Rpdo& pdo, std::uint16_t communication, std::uint16_t map) {
-    const std::uint32_t id = objects_.get(object::pdo_id(communication));
-    pdo.communication = communication;
-    pdo.id = id & (co::pdo_invalid | co::cob_mask);
-    pdo.transmission = static_cast<std::uint8_t>(objects_.get(object::pdo_transmission(communication)));
-    pdo.mapping = objects_.mapping(map);
-  };
-  load_rpdo(torque_rpdo_, object::torque_rpdo, object::torque_rpdo_map);
-  load_rpdo(controlword_rpdo_, object::controlword_rpdo, object::controlword_rpdo_map);
-  tpdo_id_ = objects_.get(object::pdo_id(object::feedback_tpdo)) & (co::pdo_invalid | co::cob_mask);
-  tpdo_transmission_ = static_cast<std::uint8_t>(objects_.get(object::pdo_transmission(object::feedback_tpdo)));
-  tpdo_mapping_ = objects_.mapping(object::feedback_tpdo_map);
+  for (std::uint16_t i = 0; i < ObjectDictionary::pdos; ++i) {
+    Rpdo& in = rpdo_[i];
+    const auto received = static_cast<std::uint16_t>(0x1400 + i);
+    in.id = objects_.get(object::pdo_id(received)) & (co::pdo_invalid | co::cob_mask);
+    in.transmission = static_cast<std::uint8_t>(objects_.get(object::pdo_transmission(received)));
+    in.deadline_ns = objects_.get(object::pdo_event_ms(received)) * ns_per_ms;
+    in.mapping = objects_.mapping(static_cast<std::uint16_t>(0x1600 + i));
+    in.has_torque = false;
+    for (std::size_t k = 0; k < in.mapping.fields; ++k) in.has_torque |= in.mapping.field[k].object == object::target_torque;
+    Tpdo& out = tpdo_[i];
+    const auto sent = static_cast<std::uint16_t>(0x1800 + i);
+    out.id = objects_.get(object::pdo_id(sent)) & (co::pdo_invalid | co::pdo_no_remote | co::cob_mask);
+    out.transmission = static_cast<std::uint8_t>(objects_.get(object::pdo_transmission(sent)));
+    out.inhibit_ns = objects_.get(object::pdo_inhibit(sent)) * ns_per_100_us;
+    out.event_ns = objects_.get(object::pdo_event_ms(sent)) * ns_per_ms;
+    out.mapping = objects_.mapping(static_cast<std::uint16_t>(0x1A00 + i));
+    out.sent = false;
+  }
+}
+
+void DriveNode::configure_services() noexcept {
+  sync_id_ = objects_.get(object::sync_id) & co::cob_mask;
+  const std::uint32_t watched = objects_.get(object::consumer_heartbeat);
+  watched_id_ = (watched >> 16) != 0 ? co::cob_heartbeat(static_cast<std::uint8_t>((watched >> 16) & 0x7F)) : co::pdo_invalid;
+  watched_ns_ = (watched & 0xFFFF) * ns_per_ms;
+  life_ns_ = objects_.get(object::guard_time) * ns_per_ms * objects_.get(object::life_time_factor);
+  period_ns_ = objects_.get(object::producer_heartbeat) * ns_per_ms;
+}
+
+CanFrame DriveNode::fill(const Tpdo& pdo) const noexcept {
+  CanFrame frame{.id = pdo.id & co::cob_mask, .length = pdo.mapping.bytes};
+  for (std::size_t i = 0; i < pdo.mapping.fields; ++i) {
+    const ObjectDictionary::Field& field = pdo.mapping.field[i];
+    const std::uint32_t value = objects_.get(field.object);
+    for (std::size_t b = 0; b < field.object.bytes; ++b) frame.data[field.offset + b] = static_cast<std::uint8_t>(value >> (8 * b));
+  }
+  return frame;
+}
+
+void DriveNode::send_tpdo(Tpdo& pdo, const CanFrame& frame, std::int64_t now_ns) noexcept {
+  put(frame);
+  pdo.last = frame;
+  pdo.sent = true;
+  pdo.sent_ns = now_ns;
+}
+
+void DriveNode::send_events(std::int64_t now_ns) noexcept {
+  bool any = false;
+  for (const Tpdo& pdo : tpdo_) any |= pdo.exists() && pdo.on_event();
+  if (!any) return;
+  publish();
+  for (Tpdo& pdo : tpdo_) {
+    if (!pdo.exists() || !pdo.on_event() || pdo.mapping.fields == 0) continue;
+    if (pdo.sent && now_ns - pdo.sent_ns < pdo.inhibit_ns) continue;
+    const CanFrame frame = fill(pdo);
+    bool due = !pdo.sent || (pdo.event_ns > 0 && now_ns - pdo.sent_ns >= pdo.event_ns);
+    for (std::size_t i = 0; i < pdo.mapping.fields && !due; ++i) {
+      const ObjectDictionary::Field& field = pdo.mapping.field[i];
+      // Position and torque change at every moment: an event of them would be a flood.
+      if (field.object == object::position || field.object == object::torque) continue;
+      for (std::size_t b = 0; b < field.object.bytes; ++b) due |= frame.data[field.offset + b] != pdo.last.data[field.offset + b];
+    }
+    if (due) send_tpdo(pdo, frame, now_ns);
+  }
 }
 
 void DriveNode::accept_rpdo(Rpdo& pdo, const CanFrame& frame, std::int64_t now_ns) noexcept {
@@ -251,7 +326,7 @@ void DriveNode::accept_rpdo(Rpdo& pdo, const CanFrame& frame, std::int64_t now_n
     emergency(emcy_pdo_length);
     return;
   }
-  if (&pdo == &torque_rpdo_) last_torque_rpdo_ns_ = now_ns;
+  pdo.heard_ns = now_ns;
   pdo.pending = frame;
   pdo.has_pending = true;
   if (pdo.transmission > 240) apply_rpdo(pdo, now_ns);
@@ -272,21 +347,18 @@ void DriveNode::apply_rpdo(Rpdo& pdo, std::int64_t now_ns) noexcept {
 
 void DriveNode::synchronise(std::int64_t now_ns) noexcept {
   publish();
-  if (torque_rpdo_.transmission <= 240) apply_rpdo(torque_rpdo_, now_ns);
-  if (controlword_rpdo_.transmission <= 240) apply_rpdo(controlword_rpdo_, now_ns);
+  for (Rpdo& pdo : rpdo_)
+    if (pdo.transmission <= 240) apply_rpdo(pdo, now_ns);
   const auto limit = static_cast<std::int32_t>(objects_.get(object::max_torque));
   const auto target = static_cast<std::int32_t>(static_cast<std::int16_t>(objects_.get(object::target_torque)));
   active_permille_ = static_cast<std::int16_t>(std::clamp(target, -limit, limit));
 
   ++syncs_;
-  if ((tpdo_id_ & co::pdo_invalid) == 0 && tpdo_transmission_ >= 1 && tpdo_transmission_ <= 240 && syncs_ % tpdo_transmission_ == 0) {
-    CanFrame frame{.id = tpdo_id_, .length = tpdo_mapping_.bytes};
-    for (std::size_t i = 0; i < tpdo_mapping_.fields; ++i) {
-      const ObjectDictionary::Field& field = tpdo_mapping_.field[i];
-      const std::uint32_t value = objects_.get(field.object);
-      for (std::size_t b = 0; b < field.object.bytes; ++b) frame.data[field.offset + b] = static_cast<std::uint8_t>(value >> (8 * b));
-    }
-    put(frame);
+  for (Tpdo& pdo : tpdo_) {
+    if (!pdo.exists() || pdo.transmission > 240 || pdo.mapping.fields == 0) continue;
+    const CanFrame frame = fill(pdo);
+    // 0: at the SYNC after a change; n: at every n-th SYNC
+    if (pdo.transmission == 0 ? !pdo.sent || !(frame == pdo.last) : syncs_ % pdo.transmission == 0) send_tpdo(pdo, frame, now_ns);
   }
   // With options below 5 the drive leaves the quick stop by itself once it has braked; without torque that is at once.
   if (state_ == DriveState::QuickStopActive && objects_.get(object::quick_stop_option) < 5) enter(DriveState::SwitchOnDisabled);
@@ -328,7 +400,7 @@ void DriveNode::control(std::uint16_t word, std::int64_t now_ns) noexcept {
       } else if (shutdown) {
         enter(DriveState::ReadyToSwitchOn);
       } else if (enable) {
-        last_torque_rpdo_ns_ = now_ns;  // the watch over the torque frames begins here
+        for (Rpdo& pdo : rpdo_) pdo.heard_ns = now_ns;  // the watch over the torque frames begins here
         enter(DriveState::OperationEnabled);
       }
       break;
@@ -355,7 +427,8 @@ void DriveNode::enter(DriveState state) noexcept {
   // Whatever was commanded before belongs to the past: enabling starts from zero torque.
   active_permille_ = 0;
   objects_.set(object::target_torque, 0);
-  torque_rpdo_.has_pending = false;
+  for (Rpdo& pdo : rpdo_)
+    if (pdo.has_torque) pdo.has_pending = false;
 }
 
 void DriveNode::connection_lost(std::uint16_t emergency_code) noexcept {
@@ -384,7 +457,10 @@ void DriveNode::emergency(std::uint16_t code) noexcept {
       code == 0 ? 0 : static_cast<std::uint8_t>(error_generic | ((code & 0xF000) == 0x8000 ? error_communication : 0));
   objects_.set(object::error_register, error);
   objects_.set(object::error_code, code);
-  CanFrame frame{.id = co::cob_emergency(config_.node), .length = 8};
+  if (code != 0) objects_.remember_error(code);
+  const std::uint32_t id = objects_.get(object::emergency_id);
+  if ((id & co::pdo_invalid) != 0) return;
+  CanFrame frame{.id = id & co::cob_mask, .length = 8};
   hal::store(frame, 0, code);
   hal::store(frame, 2, error);
   put(frame);

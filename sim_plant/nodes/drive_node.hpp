@@ -4,10 +4,13 @@
 //   set_shaft(angle, torque)  →  encoder counts  →  SYNC latches, TPDO tells
 //   torque RPDO  →  SYNC applies  →  motor_torque_nm()
 // Order in a plant step: receive() every frame that has arrived, advance(), transmit() until empty.
-// What ends in torque zero: any state but Operation enabled; master's heartbeat lost; no torque RPDO for 1400h:05 ms while enabled;
-// leaving NMT Operational while enabled; fault. The reaction to a lost master is 6007h's.
+// What ends in torque zero: any state but Operation enabled; master's heartbeat or node guarding lost; an RPDO that does not come for
+// its 14xxh:05 ms while enabled; leaving NMT Operational while enabled; fault. The reaction to a lost master is 6007h's.
+// A TPDO on event (254, 255) is sent when the drive becomes operational, when anything in it but position and torque changes, after
+// 18xxh:05 ms, and no sooner than 18xxh:03 after the one before.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -16,6 +19,7 @@
 #include "hal/can/frame.hpp"
 #include "hal/canopen/cia402.hpp"
 #include "sim_plant/nodes/object_dictionary.hpp"
+#include "sim_plant/nodes/sdo_server.hpp"
 
 namespace trocar::sim_plant {
 
@@ -36,7 +40,7 @@ struct DriveNodeCounters {
   std::uint64_t transmit_dropped{};   // answers that found the queue full
   std::uint64_t rpdo_wrong_length{};  // refused, emergency 8210h
   std::uint64_t rpdo_timeouts{};
-  std::uint64_t heartbeats_lost{};
+  std::uint64_t heartbeats_lost{};  // or node guarding
   std::uint64_t sdo_aborts{};
   std::uint64_t faults{};
 };
@@ -65,17 +69,38 @@ class DriveNode {
 
  private:
   struct Rpdo {
-    std::uint16_t communication{};
     std::uint32_t id{};  // with pdo_invalid when off
     std::uint8_t transmission{};
+    std::int64_t deadline_ns{};  // 0: none
+    bool has_torque{};
     ObjectDictionary::Mapping mapping{};
     hal::CanFrame pending{};
     bool has_pending{};
+    std::int64_t heard_ns{};
+  };
+  struct Tpdo {
+    std::uint32_t id{};
+    std::uint8_t transmission{};
+    std::int64_t inhibit_ns{};
+    std::int64_t event_ns{};
+    ObjectDictionary::Mapping mapping{};
+    hal::CanFrame last{};
+    bool sent{};  // since the drive became operational
+    std::int64_t sent_ns{};
+    [[nodiscard]] bool exists() const noexcept { return (id & hal::canopen::pdo_invalid) == 0; }
+    [[nodiscard]] bool on_event() const noexcept { return transmission >= 254; }
   };
   void reboot() noexcept;
-  void nmt_command(const hal::CanFrame& frame, std::int64_t now_ns) noexcept;
-  void serve_sdo(const hal::CanFrame& frame, std::int64_t now_ns) noexcept;
+  void nmt_command(const hal::CanFrame& frame) noexcept;
+  void answer_remote(const hal::CanFrame& frame, std::int64_t now_ns) noexcept;
+  void go_to(hal::canopen::NmtState state) noexcept;
   void configure_pdos() noexcept;
+  void configure_services() noexcept;
+  void supervise_master(std::int64_t now_ns) noexcept;
+  void master_lost() noexcept;
+  [[nodiscard]] hal::CanFrame fill(const Tpdo& pdo) const noexcept;
+  void send_tpdo(Tpdo& pdo, const hal::CanFrame& frame, std::int64_t now_ns) noexcept;
+  void send_events(std::int64_t now_ns) noexcept;
   void accept_rpdo(Rpdo& pdo, const hal::CanFrame& frame, std::int64_t now_ns) noexcept;
   void apply_rpdo(Rpdo& pdo, std::int64_t now_ns) noexcept;
   void synchronise(std::int64_t now_ns) noexcept;
@@ -93,16 +118,23 @@ class DriveNode {
   hal::canopen::DriveState state_{hal::canopen::DriveState::SwitchOnDisabled};
   std::uint16_t last_controlword_{};
 
-  Rpdo torque_rpdo_{};
-  Rpdo controlword_rpdo_{};
-  std::uint32_t tpdo_id_{};
-  std::uint8_t tpdo_transmission_{};
-  ObjectDictionary::Mapping tpdo_mapping_{};
+  SdoServer sdo_;
+  // What the objects of the communication profile say, taken over whenever one of them is written.
+  std::array<Rpdo, ObjectDictionary::pdos> rpdo_{};
+  std::array<Tpdo, ObjectDictionary::pdos> tpdo_{};
+  std::uint32_t sync_id_{};
+  std::uint32_t watched_id_{};  // heartbeats of this identifier; pdo_invalid: none
+  std::int64_t watched_ns_{};
+  std::int64_t life_ns_{};    // node guarding; 0: off
+  std::int64_t period_ns_{};  // of the own heartbeat; 0: off
+
   std::uint32_t syncs_{};
-  std::int64_t last_torque_rpdo_ns_{};
   std::int64_t next_heartbeat_ns_{};
   std::int64_t master_heard_ns_{};
   bool master_watched_{};  // from its first heartbeat on
+  std::int64_t guarded_ns_{};
+  bool guarded_{};  // from the first request on
+  std::uint8_t guard_toggle_{};
 
   std::int32_t position_counts_{};
   std::int16_t measured_permille_{};

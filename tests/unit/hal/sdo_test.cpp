@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <string>
+#include <utility>
+
 namespace trocar::hal::canopen {
 namespace {
 
@@ -44,7 +48,12 @@ TEST(Sdo, DecodesRequests) {
 }
 
 struct SdoClientTest : ::testing::Test {
+  std::optional<CanFrame> next() {
+    CanFrame frame;
+    return client.next_frame(frame, 0) ? std::optional{frame} : std::nullopt;
+  }
   SdoClient client{5};
+  static constexpr Object device_name{0x1008, 0, 0};
   static constexpr Object statusword{0x6041, 0, 2};
 };
 
@@ -71,13 +80,105 @@ TEST_F(SdoClientTest, TellsTheAbortCode) {
   EXPECT_STREQ(to_string(static_cast<SdoAbort>(client.abort_code())), "object is read-only");
 }
 
-TEST_F(SdoClientTest, RefusesWrongLengthAndSegments) {
+TEST_F(SdoClientTest, RefusesWrongLengths) {
   (void)client.upload(statusword, 0);
   client.receive(bytes(0x585, {0x43, 0x41, 0x60, 0, 1, 2, 3, 4}));
   EXPECT_EQ(client.state(), SdoClient::State::Aborted);
+  EXPECT_EQ(next(), bytes(0x605, {0x80, 0x41, 0x60, 0, 0x10, 0x00, 0x07, 0x06}));  // the node hears why
   (void)client.upload(statusword, 0);
   client.receive(bytes(0x585, {0x41, 0x41, 0x60, 0, 9, 0, 0, 0}));
+  EXPECT_EQ(client.abort_code(), 0x06070010u);
+  (void)client.upload(device_name, 0);
+  client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, 65, 0, 0, 0}));
+  EXPECT_EQ(client.abort_code(), 0x05040005u);  // beyond its capacity
+}
+
+TEST_F(SdoClientTest, ReadsATextInSegments) {
+  EXPECT_EQ(client.upload(device_name, 0), bytes(0x605, {0x40, 0x08, 0x10, 0, 0, 0, 0, 0}));
+  EXPECT_FALSE(next());
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, 10, 0, 0, 0})));
+  EXPECT_EQ(next(), bytes(0x605, {0x60, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_FALSE(next());
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x00, 's', 'e', 'r', 'v', 'o', ' ', 'd'})));
+  EXPECT_EQ(client.state(), SdoClient::State::Waiting);
+  EXPECT_EQ(next(), bytes(0x605, {0x70, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x19, 'r', 'i', 'v', 0, 0, 0, 0})));
+  EXPECT_EQ(client.state(), SdoClient::State::Done);
+  EXPECT_FALSE(next());
+  EXPECT_EQ(std::string(client.data().begin(), client.data().end()), "servo driv");
+}
+
+TEST_F(SdoClientTest, ReadsANumberFromANodeThatPutsItIntoASegment) {
+  (void)client.upload(statusword, 0);
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x40, 0x41, 0x60, 0, 0, 0, 0, 0})));  // size not stated
+  EXPECT_TRUE(next());
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x0B, 0x37, 0x12, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(client.state(), SdoClient::State::Done);
+  EXPECT_EQ(client.value(), 0x1237u);
+}
+
+TEST_F(SdoClientTest, WritesALongValueInSegments) {
+  const std::array<std::uint8_t, 14> text{'0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'a', 'b', 'c', 'd'};
+  EXPECT_EQ(client.download({0x6403, 0, 0}, text, 0), bytes(0x605, {0x21, 0x03, 0x64, 0, 14, 0, 0, 0}));
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x60, 0x03, 0x64, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(next(), bytes(0x605, {0x00, '0', '1', '2', '3', '4', '5', '6'}));
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x20, 0, 0, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(client.state(), SdoClient::State::Waiting);
+  EXPECT_EQ(next(), bytes(0x605, {0x11, '7', '8', '9', 'a', 'b', 'c', 'd'}));
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x30, 0, 0, 0, 0, 0, 0, 0})));
+  EXPECT_EQ(client.state(), SdoClient::State::Done);
+  EXPECT_FALSE(next());
+  // Short ones go in one frame.
+  EXPECT_EQ(client.download({0x1017, 0, 0}, std::span{text}.first(2), 0), bytes(0x605, {0x2B, 0x17, 0x10, 0, '0', '1', 0, 0}));
+}
+
+TEST_F(SdoClientTest, AbortsWhenTheToggleBitStandsStill) {
+  (void)client.upload(device_name, 0);
+  client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, 20, 0, 0, 0}));
+  (void)next();
+  client.receive(bytes(0x585, {0x00, 1, 2, 3, 4, 5, 6, 7}));
+  (void)next();
+  client.receive(bytes(0x585, {0x00, 1, 2, 3, 4, 5, 6, 7}));
   EXPECT_EQ(client.state(), SdoClient::State::Aborted);
+  EXPECT_EQ(next(), bytes(0x605, {0x80, 0x08, 0x10, 0, 0, 0, 0x03, 0x05}));
+
+  const std::array<std::uint8_t, 20> long_value{};
+  (void)client.download({0x6403, 0, 0}, long_value, 0);
+  client.receive(bytes(0x585, {0x60, 0x03, 0x64, 0, 0, 0, 0, 0}));
+  (void)next();
+  client.receive(bytes(0x585, {0x30, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(client.abort_code(), 0x05030000u);
+}
+
+TEST_F(SdoClientTest, AbortsWhenTheStatedSizeIsNotTheRealOne) {
+  for (const auto& [size, code] : {std::pair{std::uint8_t{8}, 0x06070013u}, {std::uint8_t{6}, 0x06070012u}}) {
+    (void)client.upload(device_name, 0);
+    client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, size, 0, 0, 0}));
+    (void)next();
+    client.receive(bytes(0x585, {0x01, 1, 2, 3, 4, 5, 6, 7}));
+    EXPECT_EQ(client.state(), SdoClient::State::Aborted);
+    EXPECT_EQ(client.abort_code(), code);
+  }
+}
+
+TEST_F(SdoClientTest, TakesAnAbortInTheMiddleOfSegments) {
+  (void)client.upload(device_name, 0);
+  client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, 20, 0, 0, 0}));
+  (void)next();
+  EXPECT_TRUE(client.receive(bytes(0x585, {0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05})));
+  EXPECT_EQ(client.state(), SdoClient::State::Aborted);
+  EXPECT_EQ(client.abort_code(), 0x05040000u);
+  EXPECT_FALSE(next());
+}
+
+TEST_F(SdoClientTest, CountsItsTimeFromTheLastRequest) {
+  (void)client.upload(device_name, 0);
+  client.receive(bytes(0x585, {0x41, 0x08, 0x10, 0, 20, 0, 0, 0}));
+  CanFrame segment;
+  ASSERT_TRUE(client.next_frame(segment, 90));
+  EXPECT_EQ(client.update(90 + 99, 100), SdoClient::State::Waiting);
+  EXPECT_EQ(client.update(90 + 100, 100), SdoClient::State::TimedOut);
+  EXPECT_EQ(next(), bytes(0x605, {0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05}));
 }
 
 TEST_F(SdoClientTest, TimesOutAtItsLimitAndNotBefore) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 namespace trocar::sim_plant {
 namespace {
@@ -67,6 +68,7 @@ struct DriveNodeTest : ::testing::Test {
     expect_ok({0x23, 0x00, 0x14, 1, 0x00, 0x02, 0, 0x80});
     expect_ok({0x2F, 0x00, 0x14, 2, 1, 0, 0, 0});
     expect_ok({0x2B, 0x00, 0x14, 5, 20, 0, 0, 0});
+    expect_ok({0x2F, 0x00, 0x16, 0, 0, 0, 0, 0});
     expect_ok({0x23, 0x00, 0x16, 1, 0x10, 0, 0x03, 0});
     expect_ok({0x23, 0x00, 0x16, 2, 0x10, 0, 0x71, 0x60});
     expect_ok({0x2F, 0x00, 0x16, 0, 2, 0, 0, 0});
@@ -74,7 +76,9 @@ struct DriveNodeTest : ::testing::Test {
     expect_ok({0x23, 0x01, 0x16, 1, 0x10, 0, 0x40, 0x60});
     expect_ok({0x2F, 0x01, 0x16, 0, 1, 0, 0, 0});
     expect_ok({0x23, 0x01, 0x14, 1, 0x02, 0x03, 0, 0});
+    expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0xC0});
     expect_ok({0x2F, 0x00, 0x18, 2, 1, 0, 0, 0});
+    expect_ok({0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0});
     expect_ok({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x64, 0x60});
     expect_ok({0x23, 0x00, 0x1A, 2, 0x10, 0, 0x77, 0x60});
     expect_ok({0x23, 0x00, 0x1A, 3, 0x10, 0, 0x41, 0x60});
@@ -110,24 +114,211 @@ TEST_F(DriveNodeTest, RefusesWithTheStandardsAbortCodes) {
   EXPECT_EQ(abort_code({0x40, 0x18, 0x10, 9, 0, 0, 0, 0}), 0x06090011u);           // no such subindex
   EXPECT_EQ(abort_code({0x23, 0x00, 0x10, 0, 0, 0, 0, 0}), 0x06010002u);           // read-only
   EXPECT_EQ(abort_code({0x2F, 0x17, 0x10, 0, 10, 0, 0, 0}), 0x06070010u);          // one byte for two
-  EXPECT_EQ(abort_code({0x21, 0x17, 0x10, 0, 9, 0, 0, 0}), 0x05040001u);           // segmented
+  EXPECT_EQ(abort_code({0x21, 0x17, 0x10, 0, 9, 0, 0, 0}), 0x06070010u);           // nine bytes for two, in segments
   EXPECT_EQ(abort_code({0x2F, 0x60, 0x60, 0, 8, 0, 0, 0}), 0x06090030u);           // a mode that it does not have
   EXPECT_EQ(abort_code({0x2B, 0x72, 0x60, 0, 0xB9, 0x0B, 0, 0}), 0x06090030u);     // 3001 permille, beyond its peak
-  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x00, 0x50}), 0x06040041u);  // not mappable
-  EXPECT_EQ(abort_code({0x23, 0x00, 0x16, 1, 0x10, 0, 0x41, 0x60}), 0x06040041u);  // a statusword cannot be commanded
+  EXPECT_EQ(abort_code({0x2F, 0x00, 0x14, 2, 241, 0, 0, 0}), 0x06090030u);         // reserved transmission type
+  EXPECT_EQ(abort_code({0x23, 0x01, 0x14, 1, 0x02, 0x06, 0, 0}), 0x06090030u);     // an SDO's identifier
+  EXPECT_EQ(abort_code({0x23, 0x01, 0x14, 1, 0x02, 0x03, 0, 0x20}), 0x06090030u);  // 29 bits
+  EXPECT_EQ(abort_code({0x23, 0x05, 0x10, 0, 0x80, 0, 0, 0x40}), 0x06090030u);     // no SYNC producer
+  EXPECT_EQ(abort_code({0xA0, 0x08, 0x10, 0, 0x20, 0, 0, 0}), 0x05040001u);        // block upload
+  EXPECT_EQ(abort_code({0xC6, 0x03, 0x64, 0, 0x20, 0, 0, 0}), 0x05040001u);        // block download
+  EXPECT_EQ(abort_code({0xE0, 0, 0, 0, 0, 0, 0, 0}), 0x05040001u);                 // no such command
+  EXPECT_EQ(abort_code({0x60, 0, 0, 0, 0, 0, 0, 0}), 0x05040001u);                 // a segment of nothing
+  EXPECT_EQ(node.counters().sdo_aborts, 15u);
+}
+
+TEST_F(DriveNodeTest, MapsByTheStandardsProcedureOnly) {
+  boot();
+  EXPECT_EQ(sdo({0x40, 0x00, 0x1A, 0, 0, 0, 0, 0}), make(0x582, {0x4F, 0x00, 0x1A, 0, 1, 0, 0, 0}));  // CiA 402: statusword at power-on
+  EXPECT_EQ(sdo({0x40, 0x00, 0x1A, 1, 0, 0, 0, 0}), make(0x582, {0x43, 0x00, 0x1A, 1, 0x10, 0x00, 0x41, 0x60}));
+  EXPECT_EQ(abort_code({0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0}), 0x08000022u);     // switch the PDO off first
+  EXPECT_EQ(abort_code({0x23, 0x00, 0x18, 1, 0x83, 1, 0, 0}), 0x08000022u);  // another identifier: the same
+  expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0x80});
+  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x64, 0x60}), 0x08000022u);  // empty the mapping first
+  expect_ok({0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x00, 0x50}), 0x06020000u);  // no such object
+  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x00, 0x10}), 0x06040041u);  // not mappable
+  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x08, 0, 0x64, 0x60}), 0x06040041u);  // a part of it
+  EXPECT_EQ(abort_code({0x23, 0x01, 0x16, 1, 0x10, 0, 0x41, 0x60}), 0x06040041u);  // a statusword cannot be commanded
+  EXPECT_EQ(abort_code({0x23, 0x01, 0x1A, 1, 0x10, 0, 0x03, 0x00}), 0x06020000u);  // nor a place holder be sent
   expect_ok({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x64, 0x60});
   expect_ok({0x23, 0x00, 0x1A, 2, 0x20, 0, 0x64, 0x60});
   expect_ok({0x23, 0x00, 0x1A, 3, 0x10, 0, 0x41, 0x60});
   EXPECT_EQ(abort_code({0x2F, 0x00, 0x1A, 0, 3, 0, 0, 0}), 0x06040042u);  // ten bytes
   expect_ok({0x2F, 0x00, 0x1A, 0, 2, 0, 0, 0});
-  EXPECT_EQ(abort_code({0x23, 0x00, 0x1A, 1, 0x20, 0, 0x64, 0x60}), 0x08000022u);  // empty the mapping first
   expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0});
-  EXPECT_EQ(abort_code({0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0}), 0x08000022u);  // switch the PDO off first
-  EXPECT_EQ(node.counters().sdo_aborts, 12u);
+}
+
+TEST_F(DriveNodeTest, GivesATextInSegments) {
+  boot();
+  // 1008h: "trocar simulated drive", 22 characters in four segments
+  EXPECT_EQ(sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x41, 0x08, 0x10, 0, 22, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x00, 't', 'r', 'o', 'c', 'a', 'r', ' '}));
+  EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x10, 's', 'i', 'm', 'u', 'l', 'a', 't'}));
+  EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x00, 'e', 'd', ' ', 'd', 'r', 'i', 'v'}));
+  EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x1D, 'e', 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(abort_code({0x60, 0, 0, 0, 0, 0, 0, 0}), 0x05040001u);                                      // it has ended
+  EXPECT_EQ(sdo({0x40, 0x0A, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x4F, 0x0A, 0x10, 0, '1', 0, 0, 0}));  // short enough for one frame
+}
+
+TEST_F(DriveNodeTest, TakesSegmentsOfAnyLength) {
+  boot();
+  EXPECT_EQ(sdo({0x21, 0x03, 0x64, 0, 9, 0, 0, 0}), make(0x582, {0x60, 0x03, 0x64, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x00, 'E', 'C', '-', 'm', 'a', 'x', ' '}), make(0x582, {0x20, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x1B, '4', '0', 0, 0, 0, 0, 0}), make(0x582, {0x30, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x40, 0x03, 0x64, 0, 0, 0, 0, 0}), make(0x582, {0x41, 0x03, 0x64, 0, 9, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x00, 'E', 'C', '-', 'm', 'a', 'x', ' '}));
+  EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x1B, '4', '0', 0, 0, 0, 0, 0}));
+  // Two bytes of a number, the size not stated
+  EXPECT_EQ(sdo({0x20, 0x17, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x60, 0x17, 0x10, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x0B, 100, 0, 0, 0, 0, 0, 0}), make(0x582, {0x20, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x40, 0x17, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x4B, 0x17, 0x10, 0, 100, 0, 0, 0}));
+}
+
+TEST_F(DriveNodeTest, EndsASegmentedTransferThatGoesWrong) {
+  boot();
+  sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x70, 0, 0, 0, 0, 0, 0, 0}), 0x05030000u);  // the first toggle bit is 0
+  sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0});
+  sdo({0x60, 0, 0, 0, 0, 0, 0, 0});
+  EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}), make(0x582, {0x80, 0x08, 0x10, 0, 0, 0, 0x03, 0x05}));  // not alternated
+  sdo({0x21, 0x03, 0x64, 0, 8, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x10, 1, 2, 3, 4, 5, 6, 7}), 0x05030000u);
+  sdo({0x21, 0x03, 0x64, 0, 8, 0, 0, 0});
+  sdo({0x00, 1, 2, 3, 4, 5, 6, 7});
+  EXPECT_EQ(abort_code({0x1B, 8, 9, 0, 0, 0, 0, 0}), 0x06070012u);  // nine bytes come, eight were stated
+  sdo({0x21, 0x03, 0x64, 0, 8, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x01, 1, 2, 3, 4, 5, 6, 7}), 0x06070013u);         // seven come
+  EXPECT_EQ(abort_code({0x21, 0x03, 0x64, 0, 41, 0, 0, 0}), 0x06070012u);  // more than it has room for
+  EXPECT_EQ(abort_code({0x21, 0x08, 0x10, 0, 8, 0, 0, 0}), 0x06010002u);   // read-only
+  sdo({0x20, 0x17, 0x10, 0, 0, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x09, 1, 2, 3, 0, 0, 0, 0}), 0x06070010u);  // three bytes of two
+  // The client gives up: nothing is answered, and nothing is left of it.
+  sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0});
+  EXPECT_FALSE(sdo({0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05}));
+  EXPECT_EQ(abort_code({0x60, 0, 0, 0, 0, 0, 0, 0}), 0x05040001u);
+  EXPECT_EQ(sdo({0x40, 0x03, 0x64, 0, 0, 0, 0, 0}), make(0x582, {0x41, 0x03, 0x64, 0, 0, 0, 0, 0}));  // still empty
+}
+
+TEST_F(DriveNodeTest, AbortsTheTransferOfASilentClientAtItsLimitAndNotBefore) {
+  boot();
+  sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0});
+  now_ns = 500 * ms;
+  sdo({0x60, 0, 0, 0, 0, 0, 0, 0});
+  node.advance(1500 * ms - 1);
+  EXPECT_FALSE(answer());
+  node.advance(1500 * ms);
+  EXPECT_EQ(answer(), make(0x582, {0x80, 0x08, 0x10, 0, 0, 0, 0x04, 0x05}));
+  node.advance(9000 * ms);
+  EXPECT_FALSE(answer());
+}
+
+TEST_F(DriveNodeTest, TellsItsStatuswordOnEventAsItComesFromTheBox) {
+  boot();
+  node.receive(make(0x000, {0x01, 2}), now_ns);
+  node.advance(now_ns);
+  EXPECT_EQ(answer(), make(0x182, {0x50, 0x02}));  // on becoming operational
+  node.receive(make(0x202, {0x06, 0x00}), now_ns);
+  node.advance(++now_ns);
+  EXPECT_EQ(answer(), make(0x182, {0x31, 0x02}));  // Ready to switch on
+  node.advance(++now_ns);
+  EXPECT_FALSE(answer());
+  expect_ok({0x2B, 0x00, 0x18, 5, 10, 0, 0, 0});  // and every 10 ms
+  node.advance(now_ns);
+  EXPECT_EQ(answer(), make(0x182, {0x31, 0x02}));
+  node.advance(now_ns + 10 * ms - 1);
+  EXPECT_FALSE(answer());
+  node.advance(now_ns += 10 * ms);
+  EXPECT_EQ(answer(), make(0x182, {0x31, 0x02}));
+}
+
+TEST_F(DriveNodeTest, WaitsForTheInhibitTimeBetweenEvents) {
+  boot();
+  expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0xC0});
+  expect_ok({0x2B, 0x00, 0x18, 3, 50, 0, 0, 0});  // 5 ms
+  expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0x40});
+  node.receive(make(0x000, {0x01, 2}), now_ns);
+  node.advance(0);
+  EXPECT_TRUE(answer());
+  node.receive(make(0x202, {0x06, 0x00}), now_ns);
+  node.advance(5 * ms - 1);
+  EXPECT_FALSE(answer());
+  node.advance(5 * ms);
+  EXPECT_EQ(answer(), make(0x182, {0x31, 0x02}));
+}
+
+TEST_F(DriveNodeTest, AnswersRemoteFramesOfItsTpdosWhereTheyAreAllowed) {
+  boot();
+  CanFrame remote{.id = 0x182, .length = 2};
+  remote.remote = true;
+  node.receive(make(0x000, {0x01, 2}), now_ns);
+  node.advance(now_ns);
+  EXPECT_TRUE(answer());
+  EXPECT_FALSE(ask(remote));  // bit 30 is set at power-on
+  expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0x00});
+  EXPECT_EQ(ask(remote), make(0x182, {0x50, 0x02}));
+}
+
+TEST_F(DriveNodeTest, GuardsAndIsGuarded) {
+  boot();
+  CanFrame remote{.id = 0x702, .length = 1};
+  remote.remote = true;
+  EXPECT_EQ(ask(remote), make(0x702, {0x7F}));
+  EXPECT_EQ(ask(remote), make(0x702, {0xFF}));  // the toggle bit
+  EXPECT_EQ(ask(remote), make(0x702, {0x7F}));
+  expect_ok({0x2B, 0x0C, 0x10, 0, 20, 0, 0, 0});
+  expect_ok({0x2F, 0x0D, 0x10, 0, 3, 0, 0, 0});
+  node.receive(make(0x000, {0x01, 2}), 0);
+  node.receive(make(0x000, {0x01, 2}), 0);
+  node.advance(60 * ms - 1);
+  EXPECT_EQ(node.nmt_state(), NmtState::Operational);
+  node.advance(60 * ms);
+  EXPECT_EQ(node.nmt_state(), NmtState::PreOperational);
+  EXPECT_EQ(node.counters().heartbeats_lost, 1u);
+  while (answer()) {
+  }
+  expect_ok({0x2B, 0x17, 0x10, 0, 20, 0, 0, 0});
+  EXPECT_FALSE(ask(remote));  // heartbeats take its place
+}
+
+TEST_F(DriveNodeTest, RemembersItsErrorsLastOneFirst) {
+  boot();
+  EXPECT_EQ(sdo({0x40, 0x03, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x4F, 0x03, 0x10, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(abort_code({0x40, 0x03, 0x10, 1, 0, 0, 0, 0}), 0x08000024u);
+  for (const int code : {0x2310, 0x4210, 0x7300, 0x8611, 0x3210}) {
+    node.trigger_fault(static_cast<std::uint16_t>(code));
+    EXPECT_TRUE(answer());
+    for (const int word : {0, 0x80}) expect_ok({0x2B, 0x40, 0x60, 0, static_cast<std::uint8_t>(word), 0, 0, 0});
+    EXPECT_TRUE(answer());  // error reset
+  }
+  EXPECT_EQ(sdo({0x40, 0x03, 0x10, 0, 0, 0, 0, 0}), make(0x582, {0x4F, 0x03, 0x10, 0, 4, 0, 0, 0}));
+  EXPECT_EQ(sdo({0x40, 0x03, 0x10, 1, 0, 0, 0, 0}), make(0x582, {0x43, 0x03, 0x10, 1, 0x10, 0x32, 0, 0}));
+  EXPECT_EQ(sdo({0x40, 0x03, 0x10, 4, 0, 0, 0, 0}), make(0x582, {0x43, 0x03, 0x10, 4, 0x10, 0x42, 0, 0}));
+  EXPECT_EQ(abort_code({0x2F, 0x03, 0x10, 0, 1, 0, 0, 0}), 0x06090030u);  // only 0 may be written
+  expect_ok({0x2F, 0x03, 0x10, 0, 0, 0, 0, 0});
+  EXPECT_EQ(abort_code({0x40, 0x03, 0x10, 1, 0, 0, 0, 0}), 0x08000024u);
+}
+
+TEST_F(DriveNodeTest, ReactsToALostMasterWithTheStateThatItsErrorBehaviourNames) {
+  for (const auto& [behaviour, state] : {std::pair{std::uint8_t{0}, NmtState::PreOperational},
+                                         {std::uint8_t{1}, NmtState::Operational},
+                                         {std::uint8_t{2}, NmtState::Stopped}}) {
+    node.restart();
+    now_ns = 0;
+    configure();
+    expect_ok({0x2F, 0x29, 0x10, 1, behaviour, 0, 0, 0});
+    node.receive(make(0x77F, {0x05}), 0);
+    node.advance(60 * ms);
+    EXPECT_EQ(node.nmt_state(), state);
+    while (answer()) {
+    }
+  }
 }
 
 TEST_F(DriveNodeTest, ProducesHeartbeats) {
   boot();
+  expect_ok({0x23, 0x00, 0x18, 1, 0x82, 0x01, 0, 0xC0});  // no feedback in between
   expect_ok({0x2B, 0x17, 0x10, 0, 20, 0, 0, 0});
   node.advance(now_ns);
   EXPECT_EQ(answer(), make(0x702, {0x7F}));
@@ -329,7 +520,8 @@ TEST_F(DriveNodeTest, ForgetsItsMappingWithACommunicationReset) {
   node.advance(now_ns);
   EXPECT_EQ(answer(), make(0x702, {0x00}));
   node.receive(make(0x000, {0x01, 2}), now_ns);
-  EXPECT_FALSE(sync());                                            // no feedback is mapped
+  EXPECT_FALSE(sync());  // the statusword comes on event, as from the box
+  EXPECT_EQ(sdo({0x40, 0x00, 0x1A, 0, 0, 0, 0, 0})->data[4], 1);
   EXPECT_EQ(sdo({0x40, 0x60, 0x60, 0, 0, 0, 0, 0})->data[4], 10);  // 6060h is no communication object
 }
 
