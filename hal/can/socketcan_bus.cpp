@@ -33,6 +33,7 @@ constexpr std::int64_t nanoseconds(const timespec& time) noexcept { return time.
 OpenStatus SocketCanBus::open(const char* interface, std::span<const std::uint32_t> ids) noexcept {
   close();
   overflowed_ = 0;
+  next_ = filled_ = 0;
   hardware_clock_ = {};
   OpenStatus status;
   const auto fail = [&](int error, const char* format, auto... values) {
@@ -102,43 +103,63 @@ bool SocketCanBus::send(const CanFrame& frame, std::int64_t) noexcept {
 }
 
 bool SocketCanBus::receive(CanFrame& frame, std::int64_t now_ns) noexcept {
-  constexpr int attempts = 64;  // a flood of CAN FD frames must not hold the caller
-  for (int i = 0; i < attempts && socket_ >= 0; ++i) {
-    canfd_frame raw{};  // its beginning is laid out as a classic frame
-    iovec part{&raw, sizeof raw};
-    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(Stamps)) + CMSG_SPACE(sizeof overflowed_)];
-    msghdr message{};
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = control;
-    message.msg_controllen = sizeof control;
-    const ssize_t size = ::recvmsg(socket_, &message, MSG_DONTWAIT);
-    if (size != CAN_MTU && size != CANFD_MTU) {
-      if (size < 0 && errno != EAGAIN && errno != EWOULDBLOCK) counters_.last_error_number = errno;
-      return false;
-    }
+  if (socket_ < 0) return false;
+  if (next_ == filled_) {
+    fill(now_ns);
+    if (filled_ == 0) return false;
+  }
+  frame = received_[next_++];
+  count_received(counters_, frame);
+  return true;
+}
+
+// One call for many frames: a system call costs more than a frame.
+void SocketCanBus::fill(std::int64_t now_ns) noexcept {
+  struct Message {
+    canfd_frame raw;  // its beginning is laid out as a classic frame
+    iovec part;
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(Stamps)) + CMSG_SPACE(sizeof(std::uint32_t))> control;
+  };
+  std::array<Message, batch> message;
+  std::array<mmsghdr, batch> header{};
+  for (std::size_t i = 0; i < batch; ++i) {
+    message[i].part = {&message[i].raw, sizeof message[i].raw};
+    header[i].msg_hdr.msg_iov = &message[i].part;
+    header[i].msg_hdr.msg_iovlen = 1;
+    header[i].msg_hdr.msg_control = message[i].control.data();
+    header[i].msg_hdr.msg_controllen = message[i].control.size();
+  }
+  next_ = filled_ = 0;
+  const int count = ::recvmmsg(socket_, header.data(), batch, MSG_DONTWAIT, nullptr);
+  if (count < 0) {
+    if (errno != EAGAIN && errno != EWOULDBLOCK) counters_.last_error_number = errno;
+    return;
+  }
+  timespec current{};
+  ::clock_gettime(CLOCK_REALTIME, &current);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     std::int64_t age_ns = 0;
-    for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr; header = CMSG_NXTHDR(&message, header)) {
-      if (header->cmsg_level != SOL_SOCKET) continue;
-      if (header->cmsg_type == SO_RXQ_OVFL) {
+    for (cmsghdr* note = CMSG_FIRSTHDR(&header[i].msg_hdr); note != nullptr; note = CMSG_NXTHDR(&header[i].msg_hdr, note)) {
+      if (note->cmsg_level != SOL_SOCKET) continue;
+      if (note->cmsg_type == SO_RXQ_OVFL) {
         std::uint32_t overflowed = 0;
-        std::memcpy(&overflowed, CMSG_DATA(header), sizeof overflowed);
+        std::memcpy(&overflowed, CMSG_DATA(note), sizeof overflowed);
         counters_.receive_dropped += overflowed - overflowed_;
         overflowed_ = overflowed;
-      } else if (header->cmsg_type == SCM_TIMESTAMPING) {
+      } else if (note->cmsg_type == SCM_TIMESTAMPING) {
         Stamps stamp{};
-        timespec current{};
-        std::memcpy(&stamp, CMSG_DATA(header), sizeof stamp);
-        ::clock_gettime(CLOCK_REALTIME, &current);
+        std::memcpy(&stamp, CMSG_DATA(note), sizeof stamp);
         const std::int64_t kernel_ns = nanoseconds(stamp[0]);
         const std::int64_t hardware_ns = nanoseconds(stamp[2]);
         age_ns = nanoseconds(current) - (hardware_ns == 0 ? kernel_ns : hardware_clock_.carry_over(hardware_ns, kernel_ns));
       }
     }
-    if (size == CANFD_MTU) {
+    if (header[i].msg_len != CAN_MTU) {
       ++counters_.unsupported;
       continue;
     }
+    const canfd_frame& raw = message[i].raw;
+    CanFrame& frame = received_[filled_++];
     frame = {};
     frame.extended = (raw.can_id & CAN_EFF_FLAG) != 0;
     frame.remote = (raw.can_id & CAN_RTR_FLAG) != 0;
@@ -147,10 +168,7 @@ bool SocketCanBus::receive(CanFrame& frame, std::int64_t now_ns) noexcept {
     frame.length = raw.len <= 8 ? raw.len : std::uint8_t{8};
     std::memcpy(frame.data.data(), raw.data, frame.data.size());
     frame.stamp_ns = now_ns - age_ns;
-    count_received(counters_, frame);
-    return true;
   }
-  return false;
 }
 
 }  // namespace trocar::hal

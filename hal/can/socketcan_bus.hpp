@@ -3,6 +3,8 @@
 // others are counted and left out.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -50,7 +52,13 @@ class SocketCanBus {
   [[nodiscard]] int file_descriptor() const noexcept { return socket_; }
 
  private:
+  void fill(std::int64_t now_ns) noexcept;
+
+  static constexpr std::size_t batch = 16;
   int socket_{-1};
+  std::array<CanFrame, batch> received_{};
+  std::size_t next_{};
+  std::size_t filled_{};
   std::uint32_t overflowed_{};  // frames that found the socket's queue full, as the kernel counts
   HardwareClock hardware_clock_{};
   BusCounters counters_{};

@@ -55,7 +55,7 @@ void DriveMaster::receive(const CanFrame& frame, std::int64_t now_ns) noexcept {
     fresh_ = true;
     feedback_seen_ = true;
   } else if (frame.id == cob_sdo_response(node_)) {
-    if (sdo_.receive(frame)) finish_exchange(now_ns);
+    if (sdo_.receive(frame) && !waits_for_sdo()) finish_exchange(now_ns);
   } else if (frame.id == cob_heartbeat(node_)) {
     if (frame.length != 1) {
       ++counters_.malformed;

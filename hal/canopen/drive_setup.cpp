@@ -80,7 +80,7 @@ DriveSetup make_drive_setup(const rig::Rig& rig, std::size_t drive) noexcept {
   std::array<Object, capacity::drives> torque_words{};
   torque_words.fill(object::dummy_int16);
   torque_words[drive] = object::target_torque;
-  b.pdo(object::torque_rpdo, object::torque_rpdo_map, cob_torque, transmission_every_sync, torque_words, rpdo_timeout_ms);
+  b.pdo(object::torque_rpdo, object::torque_rpdo_map, cob_torque, transmission_every_sync, torque_words, rpdo_timeout_ms(rig));
   b.pdo(object::controlword_rpdo, object::controlword_rpdo_map, cob_controlword(node), transmission_event, std::array{object::controlword},
         0);
   b.pdo(object::feedback_tpdo, object::feedback_tpdo_map, cob_feedback(node) | pdo_no_remote, transmission_every_sync,

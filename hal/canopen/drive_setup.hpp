@@ -31,7 +31,10 @@ struct DriveSetup {
   std::size_t steps{};
 };
 
-inline constexpr std::uint16_t rpdo_timeout_ms = 20;  // no torque frame for so long while enabled: the drive faults by itself
+// No torque frame for so long while enabled, 20 ticks: the drive faults by itself.
+[[nodiscard]] constexpr std::uint16_t rpdo_timeout_ms(const rig::Rig& rig) noexcept {
+  return static_cast<std::uint16_t>(20.0 * 1000.0 / rig.timing.tick_hz + 0.5);
+}
 
 // Rated torque of the motor (in front of the gear), to which the permille of 6071h, 6072h and 6077h refer.
 [[nodiscard]] constexpr double rated_torque_nm(const rig::Actuation& actuation) noexcept {

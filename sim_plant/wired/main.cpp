@@ -40,7 +40,6 @@ struct Options {
   bool log_drives{};
 };
 
-constexpr std::int64_t longest_wait_ns = 500'000;
 // A starved simulation slows down instead of integrating an old torque for long: real drives would not have been starved.
 constexpr std::int64_t longest_step_ns = 5'000'000;
 
@@ -66,6 +65,8 @@ int run(const Options& options) {
              hand ? ", with hand " + options.hand : "", options.seed);
   std::fflush(stdout);
 
+  // Twice a tick, though no longer than keeps starvation apart from waiting.
+  const std::int64_t longest_wait_ns = std::min(static_cast<std::int64_t>(0.5e9 / rig.timing.tick_hz), longest_step_ns / 2);
   const std::array<int, 2> inputs{drives.file_descriptor(), sensor.file_descriptor()};
   std::int64_t wall_ns = rt::monotonic_now_ns();
   std::int64_t now_ns = 0;  // the plant's own clock

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "rig_fixture.hpp"
@@ -19,7 +21,10 @@ struct MasterTest : ::testing::Test {
     for (sim_plant::DriveNode& node : drive) {
       node.advance(now_ns);
       CanFrame frame;
-      while (node.transmit(frame)) master.receive(frame, now_ns);
+      while (node.transmit(frame)) {
+        if (from_drive) from_drive(frame);
+        master.receive(frame, now_ns);
+      }
     }
   }
   bool send_one() {
@@ -46,6 +51,7 @@ struct MasterTest : ::testing::Test {
   Master master{rig};
   std::vector<sim_plant::DriveNode> drive;
   std::vector<CanFrame> sent;
+  std::function<void(CanFrame&)> from_drive;  // may change it
   DriveRequest request{};
   std::int64_t now_ns{};
 };
@@ -66,6 +72,34 @@ TEST_F(MasterTest, BringsAllDrivesUpWithinASecond) {
     EXPECT_EQ(objects.get({0x1017, 0, 2}), 20u);
     EXPECT_EQ(objects.get({0x6061, 0, 1}), 10u);
   }
+}
+
+TEST_F(MasterTest, BringsUpADriveThatPutsEveryNumberIntoASegment) {
+  CanFrame value;
+  int segments = 0;
+  from_drive = [&](CanFrame& frame) {
+    if (frame.id != cob_sdo_response(1)) return;
+    if ((frame.data[0] & 0xE2) == 0x42) {
+      value = frame;
+      frame = sdo_segmented_upload_answer(1, decode_sdo_answer(frame).object, 4u - ((frame.data[0] >> 2) & 3u));
+    } else if (frame.data[0] == 0x80) {  // the drive itself knows of no such transfer
+      ++segments;
+      const std::size_t bytes = 4u - ((value.data[0] >> 2) & 3u);
+      frame = sdo_segment(cob_sdo_response(1), 0, std::span{value.data}.subspan(4, bytes), true);
+    }
+  };
+  ASSERT_TRUE(bring_up());
+  EXPECT_GT(segments, 20);
+  EXPECT_EQ(master.drive(0).counters().sdo_aborts, 0u);
+}
+
+TEST_F(MasterTest, TellsADriveWhyItsSegmentsAreNotTaken) {
+  from_drive = [&](CanFrame& frame) {
+    if (frame.id == cob_sdo_response(1) && frame.data[0] == 0x43) frame = sdo_segmented_upload_answer(1, {0x1000, 0, 4}, 5);
+  };
+  for (int i = 0; i < 200; ++i) tick();
+  EXPECT_EQ(master.drive(0).report().problem, DriveProblem::SdoAborted);
+  EXPECT_TRUE(std::any_of(sent.begin(), sent.end(), [](const CanFrame& f) { return f.id == 0x601 && f.data[0] == 0x80; }));
 }
 
 TEST_F(MasterTest, StartsNoDriveBeforeAllAreConfigured) {
