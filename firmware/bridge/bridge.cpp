@@ -6,8 +6,10 @@
 #include <chrono>
 #include <cstring>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "common/rig/bus_budget.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/dds.hpp"
 #include "common/wire/types.hpp"
@@ -61,6 +63,17 @@ std::string refusal(ReplyCode code, Mode mode) {
       return "no virtual needle: start trocar-rig with --model IMAGE (trocar scene compile makes one)";
   }
   return {};
+}
+
+// What the CAN controllers say when it matters, else nothing.
+std::string bus_trouble(const hal::BusReport& buses) {
+  for (const auto& [name, condition] : {std::pair{"drives", buses.drives}, {"sensor", buses.sensor}})
+    if (condition >= hal::BusCondition::Passive) return fmt::format("the CAN controller of the {} bus is {}", name, to_string(condition));
+  return {};
+}
+
+double load_percent(std::uint64_t bits, std::uint64_t ticks, const rig::Rig& rig) {
+  return 100.0 * static_cast<double>(bits) / (static_cast<double>(ticks) * rig::bus_budget(rig).bits_per_tick);
 }
 
 }  // namespace
@@ -168,8 +181,11 @@ void Bridge::publish_rest() {
   next_status_ns_ = now + status_period_ns;
   const auto& s = snapshot_.status;
   std::string text;
+  const std::string trouble = bus_trouble(snapshot_.buses);
   if (s.mode == Mode::Fault) {
-    text = fault_text_;
+    text = trouble.empty() ? fault_text_ : fmt::format("{}; {}", fault_text_, trouble);
+  } else if (s.mode == Mode::Off && !trouble.empty()) {
+    text = trouble;
   } else if (s.mode == Mode::Off) {
     std::array<char, 384> line{};
     if (snapshot_.operational) {
@@ -198,6 +214,16 @@ void Bridge::publish_rest() {
   message.commands_lost = commands_lost_;
   wire::copy_text(message.gain_set, rig_.gain_set[s.gain_set].name.data());
   wire::copy_text(message.text, text);
+  // An event brings a status of its own, maybe after a tick or two, which are too few for a load.
+  const hal::BusReport& buses = snapshot_.buses;
+  const std::uint64_t ticks = buses.ticks - measured_buses_.ticks;
+  if (static_cast<double>(ticks) >= 0.05 * rig_.timing.tick_hz) {
+    drives_percent_ = load_percent(buses.drives_load.bits() - measured_buses_.drives_load.bits(), ticks, rig_);
+    sensor_percent_ = load_percent(buses.sensor_load.bits() - measured_buses_.sensor_load.bits(), ticks, rig_);
+    measured_buses_ = buses;
+  }
+  message.drives_bus_percent = static_cast<float>(drives_percent_);
+  message.sensor_bus_percent = static_cast<float>(sensor_percent_);
   (void)entities_->status.write(message);
 }
 

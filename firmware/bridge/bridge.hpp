@@ -9,6 +9,7 @@
 
 #include "common/rig/rig.hpp"
 #include "firmware/controller/controller.hpp"
+#include "hal/rig_link.hpp"
 
 namespace trocar::bridge {
 
@@ -18,6 +19,7 @@ struct Shared {
     controller::Status status{};
     hal::canopen::DriveReport drives{};
     bool operational{};
+    hal::BusReport buses{};
   };
   Ring<Snapshot, 16> snapshots;  // one every few ticks; a full ring drops, the next one says the same
   std::atomic<bool> finished{false};
@@ -49,6 +51,8 @@ class Bridge {
   std::string real_time_text_;
   std::atomic<bool> real_time_known_{false};  // releases the two above
   Shared::Snapshot snapshot_{};
+  hal::BusReport measured_buses_{};  // when their load was measured last
+  double drives_percent_{}, sensor_percent_{};
   std::string fault_text_;
   std::uint64_t commands_lost_{};
   std::int64_t next_status_ns_{};

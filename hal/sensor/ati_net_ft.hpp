@@ -22,6 +22,8 @@ inline constexpr std::uint16_t status_saturated = 0x0002;
   return frame;
 }
 
+[[nodiscard]] constexpr std::array<std::uint32_t, 2> received_ids(std::uint32_t base_id) noexcept { return {base_id + 5, base_id + 6}; }
+
 struct Reading {
   std::array<std::int16_t, 6> counts{};  // Fx Fy Fz Tx Ty Tz
   std::uint16_t status{};

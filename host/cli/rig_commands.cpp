@@ -110,9 +110,11 @@ int rig_status(std::uint32_t domain, bool json) {
     fmt::print(
         "{{\"rig\": \"{}\", \"mode\": \"{}\", \"fault\": \"{}\", \"homed\": {}, \"tared\": {}, \"real_time\": {}, \"armed_by\": "
         "\"{:016x}\", \"tick\": {}, "
-        "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"gains\": \"{}\", \"text\": \"{}\"}}\n",
+        "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"drives_bus_percent\": {:.1f}, \"sensor_bus_percent\": {:.1f}, \"gains\": "
+        "\"{}\", "
+        "\"text\": \"{}\"}}\n",
         s.rig, to_string(s.mode), to_string(s.fault), s.homed, s.tared, s.real_time, s.session, s.tick, s.ticks_late,
-        s.ticks_without_feedback, s.gain_set, text);
+        s.ticks_without_feedback, s.drives_bus_percent, s.sensor_bus_percent, s.gain_set, text);
     return 0;
   }
   fmt::print("{}: mode {}", s.rig, to_string(s.mode));
@@ -120,6 +122,8 @@ int rig_status(std::uint32_t domain, bool json) {
   fmt::print(", {}, {}, gains {}\n", s.homed ? "homed" : "not homed", s.tared ? "tared" : "not tared", s.gain_set);
   fmt::print("tick {}, {} late, {} without feedback; {}\n", s.tick, s.ticks_late, s.ticks_without_feedback,
              s.session != 0 ? fmt::format("armed by session {:016x}", s.session) : "nobody is armed");
+  fmt::print("measured bus load: drives {:.1f} %, sensor {:.1f} % (trocar rig info has the budget)\n", s.drives_bus_percent,
+             s.sensor_bus_percent);
   if (!s.text.empty()) fmt::print("{}\n", s.text);
   return 0;
 }

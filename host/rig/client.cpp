@@ -45,7 +45,9 @@ RigStatus from_wire(const wire::Status& s) {
           s.ticks_without_feedback,
           s.commands_lost,
           s.gain_set,
-          s.text};
+          s.text,
+          static_cast<double>(s.drives_bus_percent),
+          static_cast<double>(s.sensor_bus_percent)};
 }
 
 }  // namespace

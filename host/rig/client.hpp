@@ -21,6 +21,7 @@ struct RigStatus {
   std::uint64_t tick{}, ticks_late{}, ticks_without_feedback{}, commands_lost{};
   std::string gain_set;
   std::string text;
+  double drives_bus_percent{}, sensor_bus_percent{};  // measured load
 };
 
 struct RigReply {

@@ -16,6 +16,7 @@
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
 #include "common/scene/scene.hpp"
+#include "hal/can/candump.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
 #include "sim_plant/hand/hand_file.hpp"
@@ -38,6 +39,51 @@ struct Options {
   std::string hand;
   std::uint64_t seed = 1;
   bool log_drives{};
+  std::string can_log;
+};
+
+// Every frame of both buses, as candump -L of can-utils writes them.
+class CanLog {
+ public:
+  void open(const std::string& path, const rig::Buses& buses) {
+    file_ = std::fopen(path.c_str(), "we");
+    if (file_ == nullptr)
+      throw config::UserError(
+          fmt::format("--can-log {}: cannot write there ({}): give a file in a folder that you may write to", path, std::strerror(errno)));
+    path_ = path;
+    // A tunnel has no interface: its bus is named after what hangs on it.
+    const auto name = [](const rig::BusEndpoint& endpoint, const char* without) {
+      return std::string(endpoint.interface[0] != '\0' ? endpoint.interface.data() : without);
+    };
+    drives_ = name(buses.drives, "drives");
+    sensor_ = name(buses.sensor, "sensor");
+  }
+  ~CanLog() {
+    if (file_ != nullptr) std::fclose(file_);
+  }
+  CanLog() = default;
+  CanLog(const CanLog&) = delete;
+  CanLog& operator=(const CanLog&) = delete;
+
+  void drives(const hal::CanFrame& frame) noexcept { write(frame, drives_); }
+  void sensor(const hal::CanFrame& frame) noexcept { write(frame, sensor_); }
+  // False: something could not be written (the disk may be full).
+  [[nodiscard]] bool close() noexcept {
+    if (file_ == nullptr) return true;
+    const bool good = std::ferror(file_) == 0;
+    return (std::fclose(std::exchange(file_, nullptr)) == 0) && good;
+  }
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+ private:
+  void write(const hal::CanFrame& frame, const std::string& interface) noexcept {
+    if (file_ == nullptr) return;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    const auto time_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+    std::fputs(hal::candump_line(frame, time_ns, interface.c_str()).data(), file_);
+  }
+  std::FILE* file_{};
+  std::string path_, drives_, sensor_;
 };
 
 // A starved simulation slows down instead of integrating an old torque for long: real drives would not have been starved.
@@ -59,6 +105,8 @@ int run(const Options& options) {
   };
   open(drives, rig.buses.drives, "drives");
   open(sensor, rig.buses.sensor, "sensor");
+  CanLog log;
+  if (!options.can_log.empty()) log.open(options.can_log, rig.buses);
   auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, scene, options.seed);
   if (hand) plant->give_to(&*hand);
   fmt::print("trocar-plant: {} before {}{}, seed {}\n", rig.name.data(), scene ? "scene " + options.scene : "no tissue",
@@ -83,13 +131,24 @@ int run(const Options& options) {
     plant->advance(now_ns);
     while (drives.receive(frame, now_ns)) {
       heard_ns = now_ns;
+      log.drives(frame);
       for (std::size_t i = 0; i < plant->drives; ++i) plant->drive_receives(i, frame, now_ns);
     }
-    while (sensor.receive(frame, now_ns)) plant->sensor_receives(frame, now_ns);
-    for (std::size_t i = 0; i < plant->drives; ++i)
-      while (plant->drive_transmits(i, frame)) drives.send(frame, now_ns);
+    while (sensor.receive(frame, now_ns)) {
+      log.sensor(frame);
+      plant->sensor_receives(frame, now_ns);
+    }
+    for (std::size_t i = 0; i < plant->drives; ++i) {
+      while (plant->drive_transmits(i, frame)) {
+        log.drives(frame);
+        drives.send(frame, now_ns);
+      }
+    }
     drives.flush(now_ns);
-    while (plant->sensor_transmits(frame)) sensor.send(frame, now_ns);
+    while (plant->sensor_transmits(frame)) {
+      log.sensor(frame);
+      sensor.send(frame, now_ns);
+    }
     sensor.flush(now_ns);
     if (!options.log_drives) continue;
     for (std::size_t i = 0; i < plant->drives; ++i) {
@@ -101,6 +160,7 @@ int run(const Options& options) {
       std::fflush(stdout);
     }
   }
+  if (!log.close()) throw config::UserError(fmt::format("--can-log {}: not everything could be written: is the disk full?", log.path()));
   const auto& p = plant->physics();
   fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times", 1e-9 * static_cast<double>(p.time_ns()), starved);
   if (scene) fmt::print("; phantom: {} steps, {} unconverged", p.phantom().counters().steps, p.phantom().counters().unconverged);
@@ -125,6 +185,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
   app.add_flag("--log-drives", options.log_drives,
                "print every change of a drive's state, with the plant's time, torque and the controller's silence");
+  app.add_option("--can-log", options.can_log, "file for every frame of both buses, in the format of candump -L (can-utils reads it)");
   app.add_flag("--die-with-parent", die_with_parent, "stop when the process that started this one ends");
   try {
     app.parse(argc, argv);

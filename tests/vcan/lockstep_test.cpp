@@ -2,8 +2,12 @@
 // clock, each with sockets of its own. The kernel carries every frame; how fast it does so plays no part.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <memory>
+#include <string>
+#include <variant>
 
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
@@ -45,10 +49,13 @@ struct Machine {
 TEST(ExperimentOnCan, RunsWithoutFaultOrLossAndWithinTheBusBudget) {
   const rig::Rig rig = config::read_twin(TROCAR_VCAN_RIG);
   experiment::Experiment e = experiment::read_experiment(config::find_share("experiments", "insertion"));
-  e.speeds_m_s = {0.02};
-  e.depth_m = 0.02;
-  e.dwell_s = 0.1;
-  e.thesis_check = false;
+  auto& course = std::get<experiment::InsertionCourse>(e.course);
+  course.speeds_m_s = {0.02};
+  course.depth_m = 0.02;
+  course.dwell_s = 0.1;
+  course.touch_speed_m_s = 0.004;
+  course.approach_speed_m_s = 0.06;
+  course.thesis_check = false;
   const scene::Scene scene = scene::read_scene(config::find_share("scenes", e.scene));
   const auto entry = scene::entry_m(scene);
   experiment::Sequencer sequencer(e, {entry[1], entry[0], scene.needle->length_m}, rig, session);
@@ -86,7 +93,7 @@ TEST(ExperimentOnCan, RunsWithoutFaultOrLossAndWithinTheBusBudget) {
     while (mail->events.pop(event)) EXPECT_NE(event.kind, EventKind::FaultLatched) << to_string(event.fault);
   }
   ASSERT_TRUE(sequencer.finished() && !sequencer.failed()) << sequencer.failure();
-  EXPECT_NEAR(deepest_m, e.depth_m, 0.001);
+  EXPECT_NEAR(deepest_m, course.depth_m, 0.001);
   EXPECT_GT(most_n, 0.3);
 
   const hal::LinkCounters counters = link.counters();

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "common/config/rig_file.hpp"
@@ -78,7 +79,9 @@ void run_loop(Process& p, controller::Controller& controller) {
     Sample& sample = controller.sample();
     sample.tick_us = static_cast<float>(1e-3 * static_cast<double>(end_ns - begin_ns));
     p.mail.samples.push(sample);
-    if (tick % 8 == 0) p.shared.snapshots.push({controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational});
+    if (tick % 8 == 0)
+      p.shared.snapshots.push(
+          {controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational, link.bus_report()});
 
     // A missed period is not made up for by a burst: the schedule moves on.
     next_ns += period_ns;
@@ -103,12 +106,13 @@ int run(const Options& options) {
     const control::Admissible verdict = p.rig.haptic.present ? control::admit(p.rig).verdict : control::Admissible::NotPositive;
     if (verdict != control::Admissible::Yes) config::refuse_haptic(path, control::to_text(verdict));
   }
-  const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name) {
-    const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig);
+  const auto open = [&](hal::EndpointBus& bus, const rig::BusEndpoint& endpoint, const char* name, std::span<const std::uint32_t> ids) {
+    const hal::OpenStatus status = bus.open(endpoint, hal::BusSide::Rig, ids);
     if (status.error_number != 0) config::refuse_bus(path, name, "rig_port", status.message.data());
   };
-  open(p.drives, p.rig.buses.drives, "drives");
-  open(p.sensor, p.rig.buses.sensor, "sensor");
+  const auto drive_ids = hal::canopen::received_ids(p.rig);
+  open(p.drives, p.rig.buses.drives, "drives", drive_ids.all());
+  open(p.sensor, p.rig.buses.sensor, "sensor", hal::ati::received_ids(p.rig.buses.sensor_base_id));
 
   virtual_needle::VirtualNeedle needle({p.rig.haptic.fade_s});
   std::optional<model_watch::ModelWatch> model;
