@@ -52,15 +52,24 @@ class Experiment(unittest.TestCase):
         print(f"bus load at 200 Hz: drives {status['drives_bus_percent']} %, sensor {status['sensor_bus_percent']} %; "
               f"budget {budget['drives_bus_peak_percent']:.1f} %, {budget['sensor_bus_percent']:.1f} %; "
               f"{summary['ticks_without_feedback']} of {summary['samples']} ticks without feedback")
+        self.bus_off(rig)
         self.assertEqual((rig.end(), plant.end()), (0, 0), rig.said() + plant.said())
         self.can_utils_read(here("can.log"))
+
+    def bus_off(self, rig):
+        """The report that a real controller's driver makes; it names itself to who asks for the status."""
+        subprocess.run(["cansend", "vcan0", "20000040#0000000000000000"], check=True)
+        end = time.monotonic() + 20
+        while "the CAN controller of the drives bus is off the bus" not in (status := ours.run("trocar", "rig", "status", "--domain", DOMAIN)).stdout:
+            self.assertLess(time.monotonic(), end, status.stdout + status.stderr + rig.said())
 
     def can_utils_read(self, log):
         with open(log) as file:
             lines = file.readlines()
         self.assertGreater(len(lines), 5000)
         ascii_log = subprocess.run(["log2asc", "-I", log, "vcan0", "vcan1"], capture_output=True, text=True, check=True).stdout
-        self.assertEqual(sum(" Rx " in line for line in ascii_log.splitlines()), len(lines))
+        self.assertEqual(sum(" Rx " in line or "ErrorFrame" in line for line in ascii_log.splitlines()), len(lines))
+        self.assertEqual(ascii_log.count("ErrorFrame"), 1)
         # What canplayer makes of it is what candump sees, frame for frame.
         lines = [line for line in lines if " vcan0 " in line][:200]
         part = log + ".part"

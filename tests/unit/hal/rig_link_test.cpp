@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "common/rig/bus_budget.hpp"
 #include "wired_rig.hpp"
 
 namespace trocar::hal {
@@ -50,10 +51,19 @@ TEST_F(RigLinkTest, StaysWithinTheBusBudgetWhileEnabled) {
   w.command.joint_torque_nm = {0.3, -0.2, 0.1, 0.4};
   const BusCounters before = w.link.counters().drives_bus;
   const std::int64_t busy_ns = w.drives_bus.busy_ns();
+  const std::uint64_t bits = w.link.bus_report().drives_load.bits();
   for (int i = 0; i < 1000; ++i) w.tick();
   const double load_percent = static_cast<double>(w.drives_bus.busy_ns() - busy_ns) / 1e9 * 100;
   EXPECT_LT(load_percent, 73.0 + 1.5);  // cyclic worst case and the heartbeats
   EXPECT_GT(load_percent, 60.0);        // 6 frames of at least 47 + 64 bits
+  // The link counts the same bits as the bus itself, but for the frames that are on their way at both ends of the count.
+  const BusReport& report = w.link.bus_report();
+  EXPECT_NEAR(static_cast<double>(report.drives_load.bits() - bits), static_cast<double>(w.drives_bus.busy_ns() - busy_ns) / 1000.0,
+              5 * 135.0);
+  const rig::BusBudget budget = rig::bus_budget(w.rig);
+  EXPECT_LE(report.drives_load.most_in_a_tick(), budget.drives_peak_bits + 4 * rig::worst_case_can_bits(1));
+  EXPECT_LE(report.sensor_load.most_in_a_tick(), budget.sensor_bits);
+  EXPECT_GT(report.sensor_load.most_in_a_tick(), budget.sensor_bits * 3 / 4);
   const BusCounters after = w.link.counters().drives_bus;
   EXPECT_EQ(after.sent - before.sent, 2000u + 50u);  // SYNC, torque; a heartbeat every 20 ms
   EXPECT_EQ(after.received - before.received, 4000u + 200u);
