@@ -258,7 +258,8 @@ void SdoClient::segment_answered(const CanFrame& answer) noexcept {
 }
 
 SdoClient::State SdoClient::update(std::int64_t now_ns, std::int64_t timeout_ns) noexcept {
-  if (state_ == State::Waiting && now_ns - started_ns_ >= timeout_ns) {
+  // A request that still waits for its turn on the bus is not the node's delay.
+  if (state_ == State::Waiting && !has_outgoing_ && now_ns - started_ns_ >= timeout_ns) {
     fail(SdoAbort::Timeout);
     state_ = State::TimedOut;
   }

@@ -83,7 +83,7 @@ class SdoClient {
   bool receive(const CanFrame& frame) noexcept;
   // True if there is something to send: the next request of a transfer, or the abort message of one that failed here.
   bool next_frame(CanFrame& frame, std::int64_t now_ns) noexcept;
-  // At or beyond timeout_ns since its last request, a waiting transfer ends as TimedOut.
+  // At or beyond timeout_ns since its last request was sent, a waiting transfer ends as TimedOut.
   State update(std::int64_t now_ns, std::int64_t timeout_ns) noexcept;
   void reset() noexcept;  // an abort message that has not been sent yet stays
 

@@ -4,6 +4,7 @@ It shares no line and no number with hal/canopen or sim_plant/nodes: what both s
 """
 import os
 import select
+import socket
 import struct
 import threading
 import time
@@ -265,17 +266,34 @@ class Machine:
         except BaseException as failure:  # shown by close(): a dead thread would be a puzzle
             self.failure = failure
 
+    # On python3-can's sockets, but with struct can_frame of linux/can.h: its Message costs more time than this processor has.
+    FRAME = struct.Struct("=IB3x8s")
+
+    @classmethod
+    def send(cls, bus, identifier, data):
+        bus.socket.send(cls.FRAME.pack(identifier, len(data), data))
+
+    @classmethod
+    def receive(cls, bus):
+        while True:
+            try:
+                identifier, length, data = cls.FRAME.unpack(bus.socket.recv(cls.FRAME.size, socket.MSG_DONTWAIT))
+            except BlockingIOError:
+                return
+            if identifier <= 0x7FF:  # no flag: a data frame with 11 bits
+                yield identifier, data[:length]
+
     def step(self):
         drives, sensor = self.buses
-        send = lambda identifier, data: drives.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+        send = lambda identifier, data: self.send(drives, identifier, data)
         ready = select.select(self.buses, [], [], 0.01)[0]
-        if drives in ready and (frame := drives.recv(0)) is not None and not frame.is_remote_frame and not frame.is_error_frame:
+        for identifier, data in self.receive(drives) if drives in ready else ():
             for drive in self.drives:
-                drive.receive(frame.arbitration_id, bytes(frame.data), send)
+                drive.receive(identifier, data, send)
         now = time.monotonic()
         for drive in self.drives:
             drive.advance(now, send)
-        if sensor in ready and (frame := sensor.recv(0)) is not None:
-            if frame.arbitration_id == self.sensor_base and bytes(frame.data) == b"\x02":
+        for identifier, data in self.receive(sensor) if sensor in ready else ():
+            if identifier == self.sensor_base and data == b"\x02":
                 for offset in (5, 6):
-                    sensor.send(can.Message(arbitration_id=self.sensor_base + offset, is_extended_id=False, data=bytes(8)))
+                    self.send(sensor, self.sensor_base + offset, bytes(8))
