@@ -30,14 +30,22 @@ class Experiment(unittest.TestCase):
                                ("approach_speed_m_s = 0.030", "approach_speed_m_s = 0.060"), ("thesis_check = true", "thesis_check = false"))
         with open(here("experiment.toml"), "w") as file:
             file.write(text)
-        # The plant stands for hardware, which no other program delays.
-        plant = ours.Program("trocar-plant", "--rig", RIG, "--can-log", here("can.log"), prefix=("chrt", "-f", "70"))
-        self.addCleanup(plant.end)
-        plant.wait_for("before scene")
-        rig = ours.Program("trocar-rig", "--rig", RIG, "--best-effort", "--domain", DOMAIN)
-        self.addCleanup(rig.end)
-        rig.wait_for("DDS domain")
-        done = ours.run("trocar", "experiment", "run", here("experiment.toml"), "--speeds", "20", "--domain", DOMAIN, "--out", here("run"), "--json")
+        # A busy machine may keep this kernel from running for longer than the half second after which a command is refused as too old:
+        # that says nothing of the rig, and is tried again. Anything else is a failure.
+        for attempt in range(3):
+            shutil.rmtree(here("run"), ignore_errors=True)
+            # The plant stands for hardware, which no other program delays.
+            plant = ours.Program("trocar-plant", "--rig", RIG, "--can-log", here("can.log"), prefix=("chrt", "-f", "70"))
+            self.addCleanup(plant.end)
+            plant.wait_for("before scene")
+            rig = ours.Program("trocar-rig", "--rig", RIG, "--best-effort", "--domain", DOMAIN)
+            self.addCleanup(rig.end)
+            rig.wait_for("DDS domain")
+            done = ours.run("trocar", "experiment", "run", here("experiment.toml"), "--speeds", "20", "--domain", DOMAIN, "--out", here("run"), "--json")
+            if done.returncode == 0 or ": Expired " not in done.stderr:
+                break
+            rig.end()
+            plant.end()
         self.assertEqual(done.returncode, 0, done.stderr + rig.said() + plant.said())
         summary = json.loads(done.stdout)
         self.assertEqual(summary["faults"], [])
