@@ -232,14 +232,14 @@ std::string judge(const Row& row) {
   EXPECT_EQ(m.sample().fault, row.fault) << to_string(m.sample().fault);
   const Reaction reaction = safety::row(row.fault).reaction;
   // One tick for what happens between two of them, one for the frame that tells it.
-  const auto watchdog = std::max<std::uint32_t>(hal::canopen::rpdo_timeout_ms, m.rig().timing.heartbeat_timeout_ms);
+  const auto watchdog = std::max<std::uint32_t>(hal::canopen::rpdo_timeout_ms(m.rig()), m.rig().timing.heartbeat_timeout_ms);
   const auto patience = row.seen == Seen::ByDrives ? watchdog : safety::patience_ticks(row.fault, m.rig());
   if (row.seen != Seen::ByMotion) {
     EXPECT_LE(latched, static_cast<int>(patience) + 2);
   }
   int safe = 0;
   const int allowed =
-      row.seen == Seen::ByBusLoss ? hal::canopen::rpdo_timeout_ms + 1 : static_cast<int>(safety::settle_ticks(reaction, m.rig()));
+      row.seen == Seen::ByBusLoss ? hal::canopen::rpdo_timeout_ms(m.rig()) + 1 : static_cast<int>(safety::settle_ticks(reaction, m.rig()));
   const auto is_safe = [&] {
     if (row.seen == Seen::Nowhere) return m.sample().joint_torque_command_nm == std::array<double, 4>{};
     return reaction == Reaction::Hold ? m.still() && m.sample().moving == 0 : m.torque_off();
