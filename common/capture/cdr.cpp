@@ -75,8 +75,9 @@ void release(void* value, const dds_topic_descriptor_t& type) noexcept { dds_str
 
 }  // namespace detail
 
+template <class Batch>
 std::vector<std::vector<std::byte>> split_batch(std::span<const std::byte> cdr) {
-  const Decoded<wire::SampleBatch> batch(cdr);  // from here on all lengths are known to fit
+  const Decoded<Batch> batch(cdr);  // from here on all lengths are known to fit
   const std::uint32_t count = batch->samples._length;
   std::vector<std::vector<std::byte>> samples;
   samples.reserve(count);
@@ -85,8 +86,8 @@ std::vector<std::vector<std::byte>> split_batch(std::span<const std::byte> cdr) 
     return samples;
   }
   const auto body = cdr.subspan(header_size);
-  // Delimiter, protocol, dropped, delimiter of the sequence, its length; then per sample a delimiter and its bytes. Nothing is aligned
-  // to more than 4, so a sample reads the same wherever it starts.
+  // Delimiter, protocol, dropped (or end_ns), delimiter of the sequence, its length; then per sample a delimiter and its bytes. Nothing is
+  // aligned to more than 4, so a sample reads the same wherever it starts.
   std::size_t at = 4 + 4 + 8 + 4 + 4;
   for (std::uint32_t i = 0; i < count; ++i) {
     at = (at + 3) / 4 * 4;
@@ -97,5 +98,8 @@ std::vector<std::vector<std::byte>> split_batch(std::span<const std::byte> cdr) 
   }
   return samples;
 }
+
+template std::vector<std::vector<std::byte>> split_batch<wire::SampleBatch>(std::span<const std::byte> cdr);
+template std::vector<std::vector<std::byte>> split_batch<wire::FlightBatch>(std::span<const std::byte> cdr);
 
 }  // namespace trocar::capture

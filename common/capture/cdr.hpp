@@ -45,8 +45,9 @@ class Decoded {
   T value_{};
 };
 
-// The samples of a batch as messages of their own, each with its header: the bytes of the batch, cut, not encoded anew, so that fields
-// which this program does not know survive. Throws CdrError when the bytes are not a SampleBatch.
+// The samples of a SampleBatch or a FlightBatch as messages of their own, each with its header: the bytes of the batch, cut, not encoded
+// anew, so that fields which this program does not know survive. Throws CdrError when the bytes are no such batch.
+template <class Batch>
 [[nodiscard]] std::vector<std::vector<std::byte>> split_batch(std::span<const std::byte> cdr);
 
 }  // namespace trocar::capture

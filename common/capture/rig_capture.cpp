@@ -11,7 +11,8 @@ namespace trocar::capture {
 RigCaptureWriter::RigCaptureWriter(const std::filesystem::path& path) : file_(path, {.profile = "", .library = "trocar"}) {
   for (std::size_t i = 0; i < wire::topics.size(); ++i) {
     const wire::Topic& topic = wire::topics[i];
-    const char* type = topic == wire::samples_topic ? wire::descriptor<wire::Sample>().m_typename : topic.type;
+    const bool split = topic == wire::samples_topic || topic == wire::flight_topic;
+    const char* type = split ? wire::descriptor<wire::Sample>().m_typename : topic.type;
     channels_[i] = file_.add_channel(file_.add_schema(type, "omgidl", wire::idl_text()), topic.name, "cdr",
                                      {{"protocol", std::to_string(protocol_version)}});
   }
@@ -28,14 +29,25 @@ void RigCaptureWriter::write_cdr(const wire::Topic& topic, std::uint64_t log_tim
   file_.write(channel_of(topic), log_time_ns, publish_time_ns, cdr);
 }
 
-void RigCaptureWriter::write_batch_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr) {
-  const auto samples = split_batch(cdr);
-  const Decoded<wire::SampleBatch> batch(cdr);
+template <class Batch>
+void RigCaptureWriter::write_split(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr,
+                                   const Batch& batch, std::int64_t last_ns) {
+  const auto samples = split_batch<Batch>(cdr);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const std::int64_t last_ns = batch->samples._buffer[samples.size() - 1].time_ns;
-    const auto earlier_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, last_ns - batch->samples._buffer[i].time_ns));
-    write_cdr(wire::samples_topic, log_time_ns - std::min(log_time_ns, earlier_ns), publish_time_ns, samples[i]);
+    const auto earlier_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, last_ns - batch.samples._buffer[i].time_ns));
+    write_cdr(wire::topic_of<Batch>, log_time_ns - std::min(log_time_ns, earlier_ns), publish_time_ns, samples[i]);
   }
+}
+
+void RigCaptureWriter::write_batch_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr) {
+  const Decoded<wire::SampleBatch> batch(cdr);
+  if (batch->samples._length == 0) return;
+  write_split(log_time_ns, publish_time_ns, cdr, *batch, batch->samples._buffer[batch->samples._length - 1].time_ns);
+}
+
+void RigCaptureWriter::write_flight_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr) {
+  const Decoded<wire::FlightBatch> batch(cdr);
+  write_split(log_time_ns, publish_time_ns, cdr, *batch, batch->end_ns);
 }
 
 void RigCaptureWriter::write_samples(std::span<const trocar::Sample> samples, std::uint64_t start_ns) {
@@ -80,6 +92,8 @@ RigLog read_capture(const std::filesystem::path& path) {
         const Decoded<wire::Sample> sample(message.data);
         log.samples.push_back(wire::from_wire(*sample));
         log.ticks.see(sample->tick);
+      } else if (topic == wire::flight_topic.name) {
+        log.flight.push_back(wire::from_wire(*Decoded<wire::Sample>(message.data)));
       } else if (topic == wire::events_topic.name) {
         const Decoded<wire::Event> event(message.data);
         log.events.push_back({wire::from_wire(*event), event->text});

@@ -1,6 +1,7 @@
 // Captures of the rig: an MCAP file with the topics of common/wire as raw CDR and rig.idl as their schema, and what is in one.
-// rig/samples holds one trocar::wire::Sample a message, cut out of the batch that was received: a viewer then plots every tick at its own
-// time, and Foxglove's decoder (omgidl-serialization 1.0) does not know the length that XCDR2 puts before a sequence of structs.
+// rig/samples, and rig/flight likewise, holds one trocar::wire::Sample a message, cut out of the batch that was received: a viewer then
+// plots every tick at its own time, and Foxglove's decoder (omgidl-serialization 1.0) does not know the length that XCDR2 puts before a
+// sequence of structs.
 #pragma once
 
 #include <array>
@@ -28,6 +29,8 @@ class RigCaptureWriter {
   void write_cdr(const wire::Topic& topic, std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr);
   // A batch as received: the last sample is logged at log_time_ns, the others as much earlier as the controller took them earlier.
   void write_batch_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr);
+  // The same for a FlightBatch; earlier than the recording's last sample, so that its batches lie one after the other.
+  void write_flight_cdr(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr);
   template <wire::Topical T>
   void write(const T& value, std::uint64_t time_ns) {
     write_cdr(wire::topic_of<T>, time_ns, time_ns, serialise(value));
@@ -42,6 +45,9 @@ class RigCaptureWriter {
   [[nodiscard]] std::uint64_t bytes() const noexcept { return file_.bytes(); }
 
  private:
+  template <class Batch>
+  void write_split(std::uint64_t log_time_ns, std::uint64_t publish_time_ns, std::span<const std::byte> cdr, const Batch& batch,
+                   std::int64_t last_ns);
   [[nodiscard]] std::uint16_t channel_of(const wire::Topic& topic) const;
 
   McapWriter file_;
@@ -68,6 +74,7 @@ struct EventRecord {
 
 struct RigLog {
   std::vector<trocar::Sample> samples;
+  std::vector<trocar::Sample> flight;  // of all flight recordings, one after the other
   std::vector<EventRecord> events;
   TickCounter ticks;
   std::uint64_t dropped_by_controller{};          // samples that the controller itself had no room for

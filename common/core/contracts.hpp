@@ -67,7 +67,7 @@ enum class Display : std::uint8_t { FourChannel, Impedance, Admittance };
 enum class ReplyCode : std::uint8_t {
   Accepted,
   Done,          // a Move, Tare or Home that was accepted has ended as asked
-  Stopped,       // a Move ended early: force threshold, hold, stop or fault
+  Stopped,       // a Move ended early: force threshold, hold, stop or fault; or a Stop came before the command was taken
   WrongMode,     // not possible in the present mode
   SessionTaken,  // another commander is armed
   NoSession,     // only the armed session may do this
@@ -113,7 +113,9 @@ enum class EventKind : std::uint8_t {
   Homed,
   Tared,
   HostLost,
-  Limited
+  Limited,
+  FlightRecorded,  // the fault's flight recording was sent; `value` samples of it are on disk, 0 when it could not be written
+  CommandsLost,    // `value` commands since the last such event were dropped: more came than can be taken
 };
 
 struct Event {
@@ -181,8 +183,8 @@ struct Sample {
   return static_cast<std::size_t>(c) < names.size() ? names[static_cast<std::size_t>(c)] : "?";
 }
 [[nodiscard]] constexpr const char* to_string(EventKind k) noexcept {
-  constexpr std::array<const char*, 9> names{"ModeChanged", "FaultLatched", "FaultCleared", "SessionTaken", "SessionReleased",
-                                             "Homed",       "Tared",        "HostLost",     "Limited"};
+  constexpr std::array<const char*, 11> names{"ModeChanged", "FaultLatched", "FaultCleared", "SessionTaken",   "SessionReleased", "Homed",
+                                              "Tared",       "HostLost",     "Limited",      "FlightRecorded", "CommandsLost"};
   return static_cast<std::size_t>(k) < names.size() ? names[static_cast<std::size_t>(k)] : "?";
 }
 

@@ -186,10 +186,15 @@ SampleBatch BatchBuffer::message(std::uint64_t dropped) noexcept {
   SampleBatch out{};
   out.protocol = protocol_version;
   out.dropped = dropped;
-  out.samples._buffer = samples_.data();
-  out.samples._length = static_cast<std::uint32_t>(size_);
-  out.samples._maximum = static_cast<std::uint32_t>(capacity);
-  out.samples._release = false;
+  lend(out.samples);
+  return out;
+}
+
+FlightBatch BatchBuffer::flight(std::int64_t end_ns) noexcept {
+  FlightBatch out{};
+  out.protocol = protocol_version;
+  out.end_ns = end_ns;
+  lend(out.samples);
   return out;
 }
 

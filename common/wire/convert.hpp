@@ -51,8 +51,18 @@ class BatchBuffer {
   void clear() noexcept { size_ = 0; }
   // Valid until the next push or clear. `dropped`: samples lost in the controller's ring since its start.
   [[nodiscard]] SampleBatch message(std::uint64_t dropped) noexcept;
+  // The same as part of a flight recording whose last sample is of end_ns.
+  [[nodiscard]] FlightBatch flight(std::int64_t end_ns) noexcept;
 
  private:
+  template <class Sequence>
+  void lend(Sequence& sequence) noexcept {
+    sequence._buffer = samples_.data();
+    sequence._length = static_cast<std::uint32_t>(size_);
+    sequence._maximum = static_cast<std::uint32_t>(capacity);
+    sequence._release = false;
+  }
+
   std::array<Sample, capacity> samples_{};
   std::size_t size_{};
 };

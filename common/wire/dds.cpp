@@ -122,8 +122,9 @@ constexpr std::size_t batch = 64;
 }  // namespace
 
 const dds_topic_descriptor_t& descriptor_of(const Topic& topic) {
-  const std::array<const dds_topic_descriptor_t*, topics.size()> descriptors{
-      &trocar_wire_SampleBatch_desc, &trocar_wire_Status_desc, &trocar_wire_Event_desc, &trocar_wire_Command_desc, &trocar_wire_Reply_desc};
+  const std::array<const dds_topic_descriptor_t*, topics.size()> descriptors{&trocar_wire_SampleBatch_desc, &trocar_wire_FlightBatch_desc,
+                                                                             &trocar_wire_Status_desc,      &trocar_wire_Event_desc,
+                                                                             &trocar_wire_Command_desc,     &trocar_wire_Reply_desc};
   for (const auto* descriptor : descriptors) {
     if (std::string_view(descriptor->m_typename) == topic.type) return *descriptor;
   }
@@ -192,7 +193,8 @@ bool write(dds_entity_t writer, const void* value, const Topic& topic) {
   return true;
 }
 
-std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, const void*, std::int64_t), void* context) {
+std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, const void*, std::int64_t), void* context,
+                 std::size_t at_most) {
   struct Loan {
     dds_entity_t reader;
     std::array<void*, batch> values{};
@@ -213,7 +215,7 @@ std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, c
       visit(context, loan.values[i], info[i].source_timestamp);
       ++taken;
     }
-    if (static_cast<std::size_t>(count) < batch) return taken;
+    if (static_cast<std::size_t>(count) < batch || taken >= at_most) return taken;
   }
 }
 

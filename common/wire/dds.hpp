@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -77,7 +78,8 @@ namespace detail {
 [[nodiscard]] std::uint32_t matched_by_writer(dds_entity_t writer);
 [[nodiscard]] bool write(dds_entity_t writer, const void* value, const Topic& topic);
 // Takes what is there and hands every valid value to visit(context, value, source time).
-std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, const void*, std::int64_t), void* context);
+std::size_t take(dds_entity_t reader, const Topic& topic, void (*visit)(void*, const void*, std::int64_t), void* context,
+                 std::size_t at_most);
 }  // namespace detail
 
 template <Topical T>
@@ -85,9 +87,10 @@ class Reader {
  public:
   explicit Reader(const Participant& participant) : entity_(detail::make_reader(participant, topic_of<T>)) {}
 
-  // Takes everything that has arrived; visit(const T&) or visit(const T&, std::int64_t written_ns). Returns how many.
+  // Takes everything that has arrived, or `at_most` (rounded up to 64): a writer that is fast enough would keep it busy for ever.
+  // visit(const T&) or visit(const T&, std::int64_t written_ns). Returns how many.
   template <class Visit>
-  std::size_t take(Visit&& visit) {
+  std::size_t take(Visit&& visit, std::size_t at_most = std::numeric_limits<std::size_t>::max()) {
     auto call = [](void* context, const void* value, [[maybe_unused]] std::int64_t written_ns) {
       auto& function = *static_cast<std::remove_reference_t<Visit>*>(context);
       if constexpr (std::is_invocable_v<Visit&, const T&, std::int64_t>) {
@@ -96,7 +99,7 @@ class Reader {
         function(*static_cast<const T*>(value));
       }
     };
-    return detail::take(entity_.get(), topic_of<T>, call, const_cast<void*>(static_cast<const void*>(std::addressof(visit))));
+    return detail::take(entity_.get(), topic_of<T>, call, const_cast<void*>(static_cast<const void*>(std::addressof(visit))), at_most);
   }
   [[nodiscard]] std::uint32_t matched() const { return detail::matched_by_reader(entity_.get()); }  // writers seen now
   [[nodiscard]] dds_entity_t entity() const noexcept { return entity_.get(); }

@@ -20,6 +20,8 @@ struct Topic {
 
 // Samples: a lost batch is history, resending would only delay the next; deep, so that a reader may sleep for seconds.
 inline constexpr Topic samples_topic{"rig/samples", "trocar::wire::SampleBatch", false, false, 1024};
+// Flight recordings: every sample counts, and whoever comes after the fault still gets the last recording (11 batches).
+inline constexpr Topic flight_topic{"rig/flight", "trocar::wire::FlightBatch", true, true, 11};
 // Status and events: whoever joins late must know the present state and how it came about.
 inline constexpr Topic status_topic{"rig/status", "trocar::wire::Status", true, true, 1};
 inline constexpr Topic events_topic{"rig/events", "trocar::wire::Event", true, true, 256};
@@ -27,7 +29,7 @@ inline constexpr Topic events_topic{"rig/events", "trocar::wire::Event", true, t
 inline constexpr Topic command_topic{"rig/command", "trocar::wire::Command", true, false, 0};
 inline constexpr Topic reply_topic{"rig/reply", "trocar::wire::Reply", true, false, 0};
 
-inline constexpr std::array<Topic, 5> topics{samples_topic, status_topic, events_topic, command_topic, reply_topic};
+inline constexpr std::array<Topic, 6> topics{samples_topic, flight_topic, status_topic, events_topic, command_topic, reply_topic};
 
 // The text of rig.idl as this program was built with.
 [[nodiscard]] std::string_view idl_text() noexcept;

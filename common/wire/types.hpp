@@ -8,6 +8,7 @@ namespace trocar::wire {
 
 using Sample = trocar_wire_Sample;
 using SampleBatch = trocar_wire_SampleBatch;
+using FlightBatch = trocar_wire_FlightBatch;
 using Status = trocar_wire_Status;
 using Event = trocar_wire_Event;
 using Command = trocar_wire_Command;
@@ -23,6 +24,10 @@ inline const dds_topic_descriptor_t& descriptor<Sample>() noexcept {
 template <>
 inline const dds_topic_descriptor_t& descriptor<SampleBatch>() noexcept {
   return trocar_wire_SampleBatch_desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<FlightBatch>() noexcept {
+  return trocar_wire_FlightBatch_desc;
 }
 template <>
 inline const dds_topic_descriptor_t& descriptor<Status>() noexcept {
@@ -46,6 +51,8 @@ template <class T>
 inline constexpr Topic topic_of = {};
 template <>
 inline constexpr Topic topic_of<SampleBatch> = samples_topic;
+template <>
+inline constexpr Topic topic_of<FlightBatch> = flight_topic;
 template <>
 inline constexpr Topic topic_of<Status> = status_topic;
 template <>

@@ -13,6 +13,8 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/dds.hpp"
 #include "common/wire/types.hpp"
+#include "firmware/bridge/flight_delivery.hpp"
+#include "firmware/flight/recorder.hpp"
 #include "firmware/safety/faults.hpp"
 
 namespace trocar::bridge {
@@ -22,6 +24,14 @@ namespace {
 constexpr std::chrono::milliseconds period{5};  // a command waits at most this long for its tick
 constexpr std::int64_t status_period_ns = 100'000'000;
 constexpr std::size_t batch = 20;  // 50 messages a second at 1 kHz
+// A writer may send commands faster than they can be taken. Then, so that the rest of this thread has its turn and the answers do not
+// become a second flood:
+constexpr std::size_t commands_a_turn = 256;
+constexpr std::size_t refusals_a_status = 20;
+constexpr std::int64_t loss_period_ns = 1'000'000'000;  // between two events that tell of dropped commands
+// The upper half of the ring is for the armed host and for Hold, which is open to all: its keep-alives must not drown in what others
+// send. Stop has a ring of its own.
+constexpr std::size_t room_for_all = capacity::command_ring / 2;
 
 std::int64_t realtime_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -36,7 +46,7 @@ std::string refusal(ReplyCode code, Mode mode) {
     case ReplyCode::Done:
       return {};
     case ReplyCode::Stopped:
-      return "the motion ended before its target";
+      return "it was stopped before its end";
     case ReplyCode::WrongMode:
       return fmt::format("not possible in mode {}", to_string(mode));
     case ReplyCode::SessionTaken:
@@ -79,14 +89,15 @@ double load_percent(std::uint64_t bits, std::uint64_t ticks, const rig::Rig& rig
 }  // namespace
 
 struct Bridge::Entities {
-  explicit Entities(std::uint32_t domain)
+  Entities(std::uint32_t domain, const std::filesystem::path& flight_folder)
       : participant(domain),
         samples(participant),
         status(participant),
         events(participant),
         replies(participant),
         commands(participant),
-        wait(participant) {
+        wait(participant),
+        flight(participant, events, flight_folder) {
     wait.add(commands.entity());
   }
   wire::Participant participant;
@@ -97,10 +108,12 @@ struct Bridge::Entities {
   wire::Reader<wire::Command> commands;
   wire::WaitSet wait;
   wire::BatchBuffer buffer;
+  flight::Recorder recorder;
+  FlightDelivery flight;
 };
 
-Bridge::Bridge(const rig::Rig& rig, controller::Mailboxes& mail, Shared& shared)
-    : rig_(rig), mail_(mail), shared_(shared), entities_(std::make_unique<Entities>(rig.dds_domain)) {
+Bridge::Bridge(const rig::Rig& rig, controller::Mailboxes& mail, Shared& shared, const std::filesystem::path& flight_folder)
+    : rig_(rig), mail_(mail), shared_(shared), entities_(std::make_unique<Entities>(rig.dds_domain, flight_folder)) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -123,6 +136,7 @@ void Bridge::run() {
     publish_rest();
   }
   publish_samples(true);
+  if (entities_->recorder.finish()) entities_->flight.deliver(entities_->recorder.take());
   next_status_ns_ = 0;
   publish_rest();
 }
@@ -130,25 +144,36 @@ void Bridge::run() {
 void Bridge::take_commands() {
   std::array<std::string_view, capacity::gain_sets> names;
   for (std::size_t i = 0; i < rig_.gain_sets; ++i) names[i] = rig_.gain_set[i].name.data();
-  entities_->commands.take([&](const wire::Command& received) {
+  const auto take = [&](const wire::Command& received) {
     Command command;
     const ReplyCode code = wire::from_wire(received, std::span(names).first(rig_.gain_sets), realtime_ns(), command);
-    if (code == ReplyCode::Accepted && mail_.commands.push(command)) return;
-    if (code == ReplyCode::Accepted) ++commands_lost_;
-    Reply refused{received.session,
-                  received.id,
-                  static_cast<CommandKind>(received.kind),
-                  code == ReplyCode::Accepted ? ReplyCode::Expired : code,
-                  snapshot_.status.mode,
-                  snapshot_.status.tick};
+    if (code == ReplyCode::Accepted && hand_over(command)) return;
+    if (code == ReplyCode::Accepted || refusals_ == refusals_a_status) {
+      ++commands_lost_;
+      return;
+    }
+    ++refusals_;
+    const Reply refused{received.session,      received.id,          static_cast<CommandKind>(received.kind), code,
+                        snapshot_.status.mode, snapshot_.status.tick};
     (void)entities_->replies.write(wire::to_wire(refused, refusal(refused.code, refused.mode)));
-  });
+  };
+  entities_->commands.take(take, commands_a_turn);
+}
+
+bool Bridge::hand_over(const Command& command) {
+  // Full, it holds eight others that the next tick takes: this one has nothing to add.
+  if (command.kind == CommandKind::Stop) return mail_.stops.push(command);
+  const bool first = command.kind == CommandKind::Hold || (command.session != 0 && command.session == snapshot_.status.session);
+  if (!first && mail_.commands.size() >= room_for_all) return false;
+  return mail_.commands.push(command);
 }
 
 void Bridge::publish_samples(bool flush) {
   auto& buffer = entities_->buffer;
   Sample sample;
   while (mail_.samples.pop(sample)) {
+    last_sample_ns_ = sample.time_ns;
+    if (entities_->recorder.push(sample)) entities_->flight.deliver(entities_->recorder.take());
     (void)buffer.push(sample);
     if (buffer.size() < batch) continue;
     (void)entities_->samples.write(buffer.message(mail_.samples.dropped()));
@@ -179,6 +204,8 @@ void Bridge::publish_rest() {
   const std::int64_t now = monotonic_ns();
   if (now < next_status_ns_) return;
   next_status_ns_ = now + status_period_ns;
+  refusals_ = 0;
+  tell_losses(now);
   const auto& s = snapshot_.status;
   std::string text;
   const std::string trouble = bus_trouble(snapshot_.buses);
@@ -194,6 +221,8 @@ void Bridge::publish_rest() {
       hal::canopen::describe(snapshot_.drives, line);
     }
     text = line.data();
+  } else if (now < losses_told_ns_ + loss_period_ns) {
+    text = loss_text_;
   } else if (!s.homed) {
     text = "not homed";
   } else if (real_time_known_.load(std::memory_order_acquire)) {
@@ -225,6 +254,23 @@ void Bridge::publish_rest() {
   message.drives_bus_percent = static_cast<float>(drives_percent_);
   message.sensor_bus_percent = static_cast<float>(sensor_percent_);
   (void)entities_->status.write(message);
+}
+
+void Bridge::tell_losses(std::int64_t now_ns) {
+  if (commands_lost_ == losses_told_ || now_ns < losses_told_ns_ + loss_period_ns) return;
+  const auto lost = static_cast<double>(commands_lost_ - losses_told_);
+  losses_told_ = commands_lost_;
+  losses_told_ns_ = now_ns;
+  loss_text_ = fmt::format("{:.0f} commands dropped: a program floods rig/command; end it", lost);
+  const auto& s = snapshot_.status;
+  const Event event{.tick = s.tick,
+                    .time_ns = last_sample_ns_,
+                    .kind = EventKind::CommandsLost,
+                    .from = s.mode,
+                    .to = s.mode,
+                    .fault = s.fault,
+                    .value = lost};
+  (void)entities_->events.write(wire::to_wire(event, loss_text_));
 }
 
 }  // namespace trocar::bridge

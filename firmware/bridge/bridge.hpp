@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -28,8 +30,8 @@ struct Shared {
 class Bridge {
  public:
   // Opens the DDS entities and starts the thread; throws wire::Error with a remedy. Call it before the real-time set-up: threads
-  // inherit priority and core from the one that starts them.
-  Bridge(const rig::Rig& rig, controller::Mailboxes& mail, Shared& shared);
+  // inherit priority and core from the one that starts them. flight_folder: where flight recordings go, made with the first one.
+  Bridge(const rig::Rig& rig, controller::Mailboxes& mail, Shared& shared, const std::filesystem::path& flight_folder);
   ~Bridge();
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
@@ -41,6 +43,8 @@ class Bridge {
   struct Entities;
   void run();
   void take_commands();
+  [[nodiscard]] bool hand_over(const Command& command);  // false: there is no room for it
+  void tell_losses(std::int64_t now_ns);
   void publish_samples(bool flush);
   void publish_rest();
 
@@ -55,6 +59,11 @@ class Bridge {
   double drives_percent_{}, sensor_percent_{};
   std::string fault_text_;
   std::uint64_t commands_lost_{};
+  std::int64_t last_sample_ns_{};  // controller time
+  std::uint64_t losses_told_{};    // of them
+  std::int64_t losses_told_ns_ = std::numeric_limits<std::int64_t>::min() / 2;
+  std::string loss_text_;
+  std::size_t refusals_{};  // since the last status
   std::int64_t next_status_ns_{};
   std::unique_ptr<Entities> entities_;
   std::thread thread_;

@@ -21,7 +21,23 @@ constexpr int path_checks = 16;
 
 void Controller::take_commands() noexcept {
   Command command;
-  for (std::size_t i = 0; i < commands_per_tick && mail_.commands.pop(command); ++i) execute(command);
+  bool stopped = false;
+  for (std::size_t i = 0; i < capacity::stop_ring && mail_.stops.pop(command); ++i) {
+    execute(command);
+    stopped = true;
+  }
+  // A Stop overtakes: what was sent before it must not begin after it.
+  if (stopped) {
+    for (std::size_t i = 0; i < capacity::command_ring && mail_.commands.pop(command); ++i)
+      if (command.kind != CommandKind::KeepAlive) reply(command.session, command.id, command.kind, ReplyCode::Stopped);
+    return;
+  }
+  // A keep-alive costs next to nothing, and must not be late because others wait before it: only what may cost something is counted.
+  std::size_t executed = 0;
+  for (std::size_t i = 0; i < capacity::command_ring && executed < commands_per_tick && mail_.commands.pop(command); ++i) {
+    execute(command);
+    executed += command.kind == CommandKind::KeepAlive ? 0u : 1u;
+  }
 }
 
 void Controller::execute(const Command& command) noexcept {

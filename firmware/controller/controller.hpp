@@ -28,6 +28,7 @@ namespace trocar::controller {
 // Everything that leaves or enters the tick without waiting. One bridge thread is at the other end of each ring.
 struct Mailboxes {
   Ring<Command, capacity::command_ring> commands;
+  Ring<Command, capacity::stop_ring> stops;  // Stop alone: whatever fills the other, the next tick stops
   Ring<Reply, capacity::event_ring> replies;
   Ring<Event, capacity::event_ring> events;
   Ring<Sample, capacity::sample_ring> samples;
@@ -60,6 +61,9 @@ class Controller {
   Controller(const rig::Rig& rig, Mailboxes& mail, bool real_time, virtual_needle::VirtualNeedle* needle = nullptr) noexcept;
 
   [[nodiscard]] const hal::LinkCommand& tick(const TickInput& input) noexcept;
+
+  // As the command, from the tick's own thread between two ticks.
+  void stop() noexcept { execute({.kind = CommandKind::Stop}); }
 
   // Of the last tick. The caller fills in the execution time and pushes it into the ring.
   [[nodiscard]] Sample& sample() noexcept { return sample_; }

@@ -37,6 +37,7 @@ std::string summary(const Recording& recording, const std::filesystem::path& pat
   };
   std::string line = "recorded " + count(wire::samples_topic) + " samples, " + count(wire::events_topic) + " events, " +
                      count(wire::command_topic) + " commands, " + count(wire::reply_topic) + " replies to " + path.string();
+  if (recording.messages.contains(wire::flight_topic.name)) line += ", with " + count(wire::flight_topic) + " samples of flight recordings";
   if (recording.ticks.lost() > 0) {
     line += "; " + std::to_string(recording.ticks.lost()) + " ticks lost in " + std::to_string(recording.ticks.gaps()) + " gaps";
   }
@@ -76,6 +77,13 @@ void Recorder::take() {
     const wire::Topic& topic = reader.topic();
     reader.take([&](std::span<const std::byte> cdr, std::int64_t written_ns) {
       const auto publish_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, written_ns));
+      if (topic == wire::flight_topic) {
+        const capture::Decoded<wire::FlightBatch> batch(cdr);
+        refuse_foreign(wire::version_problem("the rig", batch->protocol));
+        recording_.messages[topic.name] += batch->samples._length;
+        file_.write_flight_cdr(wall_clock_ns(), publish_ns, cdr);
+        return;
+      }
       if (topic != wire::samples_topic) {
         ++recording_.messages[topic.name];
         file_.write_cdr(topic, wall_clock_ns(), publish_ns, cdr);

@@ -16,7 +16,7 @@
 namespace trocar::host {
 
 struct Recording {
-  std::map<std::string, std::uint64_t> messages;  // by topic; rig/samples counts samples
+  std::map<std::string, std::uint64_t> messages;  // by topic; rig/samples and rig/flight count samples
   capture::TickCounter ticks;                     // of the samples received
   std::uint64_t dropped_by_controller{};          // samples that the rig itself had no room for
   std::uint64_t bytes{};                          // in the file

@@ -23,6 +23,7 @@
 #include "common/experiment/experiment_file.hpp"
 #include "common/experiment/truth_file.hpp"
 #include "common/scene/scene.hpp"
+#include "common/wire/topics.hpp"
 #include "host/cli/process.hpp"
 #include "host/experiment/runner.hpp"
 #include "host/report/report.hpp"
@@ -137,7 +138,7 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
   if (options.own_rig) {
     std::vector<std::string> plant_arguments{"--rig", setup.rig_file.string(), "--seed", std::to_string(options.seed), "--die-with-parent"};
     std::vector<std::string> rig_arguments{"--rig",         setup.rig_file.string(), "--domain", std::to_string(domain),
-                                           "--best-effort", "--die-with-parent"};
+                                           "--best-effort", "--die-with-parent",     "--flight", (out / "flight").string()};
     if (!setup.experiment.plant.empty()) plant_arguments.insert(plant_arguments.end(), {"--plant", setup.experiment.plant});
     if (setup.experiment.haptic()) {  // the scene is the controller's model, and nothing stands in front of the machine but a person
       const auto image = out / "model.image";
@@ -270,6 +271,12 @@ int make_report(const std::filesystem::path& folder, bool json) {
   if (std::filesystem::exists(folder / "truth.csv"))
     for (const experiment::Truth& t : experiment::read_truth(folder / "truth.csv")) info.truth.push_back({t.tick, t.hand_wrench});
   if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
+  for (const capture::EventRecord& e : log.events) {
+    // A recording of before this run is still sent to whoever comes late.
+    if (e.event.kind != EventKind::FlightRecorded || e.event.tick < log.samples.front().tick) continue;
+    info.notes.push_back(fmt::format("flight recording of {} at tick {}: in capture.mcap on {}, and {}{}", to_string(e.event.fault),
+                                     e.event.tick, wire::flight_topic.name, e.event.value > 0 ? "in " : "not on disk: ", e.text));
+  }
   if (run.lockstep)
     info.notes.push_back(
         fmt::format("{:.1f} s simulated in {:.1f} s, {:.1f} times real time", run.simulated_s, run.wall_s, run.simulated_s / run.wall_s));

@@ -45,7 +45,7 @@ class Scratch {
   std::filesystem::path folder_;
 };
 
-// One of the programs in build/…/bin, with its output in files. Killed, not asked, when it goes out of scope.
+// One of the programs in build/…/bin, in the scratch folder, with its output in files there. Killed, not asked, when it goes out of scope.
 class Program {
  public:
   Program(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments);

@@ -41,6 +41,7 @@ struct Options {
   int priority = 80;
   std::int64_t domain = -1;
   std::string model;
+  std::string flight = "flight";
   bool open_network{};
 };
 
@@ -89,7 +90,7 @@ void run_loop(Process& p, controller::Controller& controller) {
 
     if (until_shutdown > 0) --until_shutdown;
     if (until_shutdown < 0 && stop_asked.load(std::memory_order_relaxed)) {
-      p.mail.commands.push({.session = 0, .id = 0, .kind = CommandKind::Stop});
+      controller.stop();
       until_shutdown = static_cast<int>(0.5 * p.rig.timing.tick_hz);
     }
     if (until_shutdown > 1 && !safety::has_torque(controller.status().mode)) until_shutdown = 1;
@@ -124,7 +125,7 @@ int run(const Options& options) {
         "CYCLONEDDS_URI opens DDS to a network on which whoever is there may command this rig: unset it, name keys in TROCAR_KEYS (trocar "
         "keys "
         "makes them), or add --open-network where nobody else can be");
-  bridge::Bridge bridge(p.rig, p.mail, p.shared);
+  bridge::Bridge bridge(p.rig, p.mail, p.shared, options.flight);
   rt::Setup setup;
   setup.apply({options.priority, options.cpu});
   std::string missing;
@@ -161,6 +162,8 @@ int main(int argc, char** argv) {
   app.add_option("--model", options.model,
                  "model image for Haptic mode, from trocar scene compile; one that replaces it is taken while the rig runs");
   app.add_option("--domain", options.domain, "DDS domain instead of the rig file's")->check(CLI::Range(0, 230));
+  app.add_option("--flight", options.flight, "folder for flight recordings: the last second before each fault, the newest 20 stay")
+      ->capture_default_str();
   app.add_option("--cpu", options.cpu, "core to run on")->check(CLI::NonNegativeNumber);
   app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
   app.add_flag("--open-network", options.open_network, "accept a network without keys (CYCLONEDDS_URI set, TROCAR_KEYS not)");
@@ -174,6 +177,7 @@ int main(int argc, char** argv) {
   if (die_with_parent) prctl(PR_SET_PDEATHSIG, SIGTERM);
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of its writer, not the end of the controller
   try {
     return run(options);
   } catch (const std::exception& e) {

@@ -114,12 +114,13 @@ TEST(Cdr, SkipsFieldsThatANewerWriterAppended) {
 
 TEST(Cdr, SamplesCutFromABatchEqualSamplesEncodedAlone) {
   const auto batch = std::make_unique<wire::BatchBuffer>();
-  EXPECT_TRUE(capture::split_batch(serialise(batch->message(0))).empty());
+  EXPECT_TRUE(capture::split_batch<wire::SampleBatch>(serialise(batch->message(0))).empty());
   const auto samples = example::samples(5, 100);
   for (const Sample& s : samples) batch->push(s);
-  const auto cut = capture::split_batch(serialise(batch->message(6)));
+  const auto cut = capture::split_batch<wire::SampleBatch>(serialise(batch->message(6)));
   ASSERT_EQ(cut.size(), 100u);
   for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(cut[i], serialise(wire::to_wire(samples[i])));
+  EXPECT_EQ(capture::split_batch<wire::FlightBatch>(serialise(batch->flight(-7))), cut);
 }
 
 TEST(Cdr, SamplesCutFromABatchKeepFieldsThatANewerWriterAppended) {
@@ -133,7 +134,7 @@ TEST(Cdr, SamplesCutFromABatchKeepFieldsThatANewerWriterAppended) {
     size += 4;
     std::memcpy(&cdr[delimiter], &size, sizeof size);
   }
-  const auto cut = capture::split_batch(cdr);
+  const auto cut = capture::split_batch<wire::SampleBatch>(cdr);
   ASSERT_EQ(cut.size(), 1u);
   EXPECT_EQ(cut[0].size(), serialise(wire::to_wire(example::sample(8))).size() + 4);
   EXPECT_EQ(cut[0].back(), std::byte{4});

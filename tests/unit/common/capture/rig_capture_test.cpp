@@ -63,6 +63,35 @@ TEST(RigCapture, LogsEverySampleOfABatchAtItsOwnTime) {
   EXPECT_EQ(times.back(), 1'000'000'000u);
 }
 
+// Two batches of one recording, which are sent at nearly the same time: what lies before its last sample is logged so much earlier.
+TEST(RigCapture, LogsAFlightRecordingAtItsOwnTime) {
+  const example::Folder folder;
+  const auto samples = example::samples(10, 40);  // 1 ms apart
+  {
+    RigCaptureWriter file(folder / "capture.mcap");
+    const auto batch = std::make_unique<wire::BatchBuffer>();
+    for (const std::size_t first : {0u, 20u}) {
+      batch->clear();
+      for (std::size_t i = first; i < first + 20; ++i) batch->push(samples[i]);
+      file.write_flight_cdr(1'000'000'000 + first, 999'000'000, serialise(batch->flight(samples.back().time_ns)));
+    }
+    file.close();
+    EXPECT_EQ(file.messages(wire::flight_topic), 40u);
+  }
+  std::vector<std::uint64_t> times;
+  McapReader(folder / "capture.mcap").read([&](const Message& m) {
+    EXPECT_EQ(m.channel->topic, "rig/flight");
+    times.push_back(m.log_time_ns);
+  });
+  ASSERT_EQ(times.size(), 40u);
+  EXPECT_EQ(times.front(), 961'000'000u);
+  EXPECT_EQ(times.back(), 1'000'000'020u);
+  const RigLog log = read_capture(folder / "capture.mcap");
+  EXPECT_TRUE(log.samples.empty());
+  ASSERT_EQ(log.flight.size(), 40u);
+  EXPECT_EQ(log.flight[33].pose, samples[33].pose);
+}
+
 TEST(RigCapture, NamesBothVersionsOfAForeignRecording) {
   const example::Folder folder;
   {

@@ -36,6 +36,7 @@ struct FakeRig {
   bool sensor_answers = true;
   bool drives_enable = true;  // follow the request
   bool torque_follows = true;
+  double torque_error_nm{};   // that the first drive says beside the truth
   bool host_talks = true;     // a KeepAlive in every tick
   bool follows = true;        // the handle stands at the set point
   bool torque_finite = true;  // over all ticks
@@ -65,6 +66,7 @@ struct FakeRig {
   void tick(int n = 1) {
     for (int k = 0; k < n; ++k) {
       for (std::size_t i = 0; i < 4; ++i) feedback.drive[i].joint_torque_nm = torque_follows ? acted_nm_[i] : 0.0;
+      feedback.drive[0].joint_torque_nm += torque_error_nm;
       acted_nm_ = out.joint_torque_nm;
       for (auto& d : feedback.drive) {
         d.fresh = drives_answer;

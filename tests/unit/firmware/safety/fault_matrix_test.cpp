@@ -4,9 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -16,6 +14,7 @@
 #include "common/scene/scene.hpp"
 #include "firmware/safety/faults.hpp"
 #include "hal/canopen/objects.hpp"
+#include "readme_table.hpp"
 #include "sim_plant/bench/bench.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 
@@ -276,21 +275,7 @@ std::string judge(const Row& row) {
 TEST(FaultMatrix, EveryRowIsNamedReactsInTimeAndIsShown) {
   std::string table = "| what happens | fault | reaction | ticks to the fault | and to the safe state |\n|---|---|---|---|---|\n";
   for (const Row& row : rows()) table += judge(row);
-  const std::filesystem::path readme = std::filesystem::path(TROCAR_SOURCE) / "firmware/safety/README.md";
-  std::ifstream in(readme);
-  std::ostringstream text;
-  text << in.rdbuf();
-  const std::string begin = "<!-- fault matrix: begin -->\n", end = "<!-- fault matrix: end -->";
-  const std::string all = text.str();
-  const std::size_t from = all.find(begin), to = all.find(end);
-  ASSERT_NE(from, std::string::npos);
-  ASSERT_NE(to, std::string::npos);
-  const std::size_t at = from + begin.size();
-  if (std::getenv("TROCAR_WRITE_TABLES") != nullptr) {
-    std::ofstream(readme) << all.substr(0, at) + table + all.substr(to);
-    return;
-  }
-  EXPECT_EQ(all.substr(at, to - at), table) << "run this test with TROCAR_WRITE_TABLES=1 to bring the README up to date";
+  trocar::testing::expect_shown("firmware/safety/README.md", "fault matrix", table);
 }
 
 }  // namespace

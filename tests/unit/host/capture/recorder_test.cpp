@@ -41,7 +41,8 @@ bool eventually(const std::function<bool()>& condition) {
 // A rig that only talks: batches of 20 ticks.
 class TalkingRig {
  public:
-  explicit TalkingRig(std::uint32_t domain) : participant_(domain), samples_(participant_), status_(participant_), events_(participant_) {
+  explicit TalkingRig(std::uint32_t domain)
+      : participant_(domain), samples_(participant_), flight_(participant_), status_(participant_), events_(participant_) {
     wire::Status status{};
     status.protocol = protocol_version;
     (void)status_.write(status);
@@ -61,17 +62,24 @@ class TalkingRig {
     message.protocol = protocol;
     (void)samples_.write(message);
   }
+  void say_flight(std::uint64_t first_tick) {
+    batch_->clear();
+    for (std::uint64_t i = 0; i < 7; ++i) batch_->push(Sample{.tick = first_tick + i, .time_ns = static_cast<std::int64_t>(i)});
+    (void)flight_.write(batch_->flight(6));
+  }
 
  private:
   wire::Participant participant_;
   wire::Writer<wire::SampleBatch> samples_;
+  wire::Writer<wire::FlightBatch> flight_;
   wire::Writer<wire::Status> status_;
   wire::Writer<wire::Event> events_;
   std::unique_ptr<wire::BatchBuffer> batch_ = std::make_unique<wire::BatchBuffer>();
 };
 
 TEST_F(RecorderTest, RecordsEveryTopicAndCountsLostTicks) {
-  TalkingRig rig(test_domain());  // before the recorder: its first status and event must be recorded all the same
+  TalkingRig rig(test_domain());  // before the recorder: first status and event, and the last flight recording, are recorded all the same
+  rig.say_flight(500);
   host::Recorder recorder(folder_ / "x.mcap", test_domain());
   ASSERT_TRUE(eventually([&] { return rig.heard(); }));
   const wire::Participant commander(test_domain());
@@ -86,7 +94,7 @@ TEST_F(RecorderTest, RecordsEveryTopicAndCountsLostTicks) {
   ASSERT_TRUE(eventually([&] {
     recorder.spin(10ms);
     const auto& m = recorder.recording().messages;
-    return m.contains("rig/samples") && m.at("rig/samples") == 60 && m.size() == 5;
+    return m.contains("rig/samples") && m.at("rig/samples") == 60 && m.size() == wire::topics.size();
   }));
   recorder.close();
   EXPECT_EQ(recorder.recording().ticks.lost(), 5u);
@@ -99,6 +107,8 @@ TEST_F(RecorderTest, RecordsEveryTopicAndCountsLostTicks) {
   EXPECT_EQ(log.messages, recorder.recording().messages);
   ASSERT_EQ(log.samples.size(), 60u);
   EXPECT_EQ(log.samples.back().tick, 64u);
+  ASSERT_EQ(log.flight.size(), 7u);
+  EXPECT_EQ(log.flight.back().tick, 506u);
   EXPECT_EQ(log.samples.back().base_wrench[1], 0.1 * 64.0);
   EXPECT_EQ(log.ticks.lost(), 5u);
   EXPECT_EQ(log.events.at(0).text, "started");

@@ -427,6 +427,36 @@ TEST_F(DriveNodeTest, FaultsWhenTorqueFramesStopAtTheLimitAndNotBefore) {
   EXPECT_EQ(sdo({0x40, 0x3F, 0x60, 0, 0, 0, 0, 0}), make(0x582, {0x4B, 0x3F, 0x60, 0, 0x50, 0x82, 0, 0}));
 }
 
+TEST_F(DriveNodeTest, AFaultOfItsWatchdogsStaysWhenTheFramesComeBack) {
+  for (const bool heartbeat : {false, true}) {
+    node.restart();
+    now_ns = 0;
+    enable();
+    if (heartbeat) {
+      node.receive(make(0x77F, {0x05}), 0);
+      now_ns = 55 * ms;
+      torque(500);
+    }
+    node.advance(heartbeat ? 60 * ms : 20 * ms + 1);
+    ASSERT_EQ(node.state(), DriveState::Fault);
+    for (now_ns = 61 * ms; now_ns < 1000 * ms; now_ns += ms) {
+      node.receive(make(0x77F, {0x05}), now_ns);
+      node.receive(make(0x000, {0x01, 2}), now_ns);  // as a master would that starts it again
+      torque(500);
+      sync();
+      control(0x0F);
+      node.advance(now_ns);
+      ASSERT_EQ(node.state(), DriveState::Fault);
+      ASSERT_EQ(node.motor_torque_nm(), 0.0);
+    }
+    control(0x80);  // an explicit reset leads out of it, and no torque comes with it
+    EXPECT_EQ(node.state(), DriveState::SwitchOnDisabled);
+    EXPECT_EQ(node.motor_torque_nm(), 0.0);
+    while (answer()) {
+    }
+  }
+}
+
 TEST_F(DriveNodeTest, DoesNotMissTorqueFramesWhileDisabled) {
   configure();
   node.advance(1000 * ms);
