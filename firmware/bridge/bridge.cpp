@@ -14,6 +14,7 @@
 #include "common/wire/dds.hpp"
 #include "common/wire/types.hpp"
 #include "firmware/bridge/flight_delivery.hpp"
+#include "firmware/controller/door.hpp"
 #include "firmware/flight/recorder.hpp"
 #include "firmware/safety/faults.hpp"
 
@@ -29,9 +30,6 @@ constexpr std::size_t batch = 20;  // 50 messages a second at 1 kHz
 constexpr std::size_t commands_a_turn = 256;
 constexpr std::size_t refusals_a_status = 20;
 constexpr std::int64_t loss_period_ns = 1'000'000'000;  // between two events that tell of dropped commands
-// The upper half of the ring is for the armed host and for Hold, which is open to all: its keep-alives must not drown in what others
-// send. Stop has a ring of its own.
-constexpr std::size_t room_for_all = capacity::command_ring / 2;
 
 std::int64_t realtime_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -147,7 +145,7 @@ void Bridge::take_commands() {
   const auto take = [&](const wire::Command& received) {
     Command command;
     const ReplyCode code = wire::from_wire(received, std::span(names).first(rig_.gain_sets), realtime_ns(), command);
-    if (code == ReplyCode::Accepted && hand_over(command)) return;
+    if (code == ReplyCode::Accepted && controller::let_in(mail_, snapshot_.status.session, command)) return;
     if (code == ReplyCode::Accepted || refusals_ == refusals_a_status) {
       ++commands_lost_;
       return;
@@ -158,14 +156,6 @@ void Bridge::take_commands() {
     (void)entities_->replies.write(wire::to_wire(refused, refusal(refused.code, refused.mode)));
   };
   entities_->commands.take(take, commands_a_turn);
-}
-
-bool Bridge::hand_over(const Command& command) {
-  // Full, it holds eight others that the next tick takes: this one has nothing to add.
-  if (command.kind == CommandKind::Stop) return mail_.stops.push(command);
-  const bool first = command.kind == CommandKind::Hold || (command.session != 0 && command.session == snapshot_.status.session);
-  if (!first && mail_.commands.size() >= room_for_all) return false;
-  return mail_.commands.push(command);
 }
 
 void Bridge::publish_samples(bool flush) {

@@ -43,7 +43,6 @@ class Bridge {
   struct Entities;
   void run();
   void take_commands();
-  [[nodiscard]] bool hand_over(const Command& command);  // false: there is no room for it
   void tell_losses(std::int64_t now_ns);
   void publish_samples(bool flush);
   void publish_rest();

@@ -43,8 +43,12 @@ void FlightDelivery::run() {
     const flight::Recording recording = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
-    send(recording);
-    write(recording);
+    try {
+      send(recording);
+      write(recording);
+    } catch (const std::exception& e) {  // whatever it is, the rig goes on
+      fmt::print(stderr, "trocar-rig: the flight recording of {} is lost: {}\n", to_string(recording.fault), e.what());
+    }
     lock.lock();
   }
 }

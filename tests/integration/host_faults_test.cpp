@@ -31,6 +31,11 @@ class HostFaults : public RunningRig {
     for (const auto& e : std::filesystem::directory_iterator(flight_folder, none)) files.push_back(e.path());
     return files;
   }
+  // As a full disk would: what is written beyond fails.
+  static void let_files_grow_to(const Program& program, rlim_t bytes) {
+    const rlimit limit{bytes, RLIM_INFINITY};
+    ASSERT_EQ(prlimit(program.pid(), RLIMIT_FSIZE, &limit, nullptr), 0);
+  }
   // The events of the recorder's file of one kind.
   static std::vector<capture::EventRecord> of(const capture::RigLog& log, EventKind kind) {
     std::vector<capture::EventRecord> found;
@@ -122,27 +127,20 @@ TEST_F(HostFaults, TheReportOfARunNamesItsFlightRecording) {
   EXPECT_GT(capture::read_capture(run / "capture.mcap").flight.size(), capacity::flight_aftermath);
 }
 
-class UnwritableFlight : public HostFaults {
- protected:
-  void SetUp() override {
-    write_text(flight_folder, "not a folder");
-    HostFaults::SetUp();
-  }
-};
-
-TEST_F(UnwritableFlight, IsSaidAndTheHostHasTheRecordingAllTheSame) {
-  const std::string folder = flight_folder.string();
+TEST_F(HostFaults, AFullDiskCostsTheFlightRecordingItsFileOnly) {
   ASSERT_NO_FATAL_FAILURE(arm_and_move());
+  let_files_grow_to(*rig, 50'000);
   plant->signal(SIGKILL);
   ASSERT_TRUE(until(react_s, [&] { return event(EventKind::FlightRecorded) != nullptr; }));
-  EXPECT_EQ(event(EventKind::FlightRecorded)->event.value, 0.0);
-  EXPECT_NE(event(EventKind::FlightRecorded)->text.find(folder), std::string::npos) << event(EventKind::FlightRecorded)->text;
-  EXPECT_NE(rig->errors().find("no flight recording on disk: "), std::string::npos) << rig->errors();
-  EXPECT_NE(rig->errors().find(folder), std::string::npos) << rig->errors();
-  EXPECT_TRUE(rig->running());
   armed = false;
-  const auto log = finish_recording();
-  EXPECT_GT(log.flight.size(), capacity::flight_aftermath);
+  const auto* told = event(EventKind::FlightRecorded);
+  EXPECT_EQ(told->event.value, 0.0);
+  EXPECT_NE(told->text.find(flight_folder.string()), std::string::npos) << told->text;
+  EXPECT_NE(rig->errors().find("no flight recording on disk: cannot write " + flight_folder.string()), std::string::npos) << rig->errors();
+  EXPECT_NE(rig->errors().find("File too large"), std::string::npos) << rig->errors();
+  EXPECT_TRUE(flights().empty());  // and no half of one
+  EXPECT_TRUE(rig->running());
+  EXPECT_GT(finish_recording().flight.size(), capacity::flight_aftermath);
 }
 
 // The host's machine is there, but nothing comes from it any more: no goodbye, and DDS does not know yet.
@@ -210,24 +208,16 @@ TEST_F(HostFaults, AFloodOfForeignCommandsLeavesTheRigInASafeState) {
 
 // The recorder's disk is full: it ends with one sentence, its file is readable so far, and the rig does not notice.
 TEST_F(HostFaults, AFullDiskEndsTheRecordingOnly) {
-  recorder.reset();
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  const rlimit small{600'000, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);  // the recorder inherits it
-  const auto file = scratch / "full.mcap";
-  recorder.emplace(scratch, "trocar", std::vector<std::string>{"record", "--out", file.string(), "--domain", domain});
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  ASSERT_TRUE(recorder->wait_for("recording to", start_s)) << recorder->errors();
   ASSERT_NO_FATAL_FAILURE(arm_and_move());
+  let_files_grow_to(*recorder, std::filesystem::file_size(capture_file) + 200'000);
   ASSERT_TRUE(until(start_s, [&] { return !recorder->running(); }));
   EXPECT_EQ(recorder->wait(react_s), 1);
   const std::string text = recorder->errors();
-  EXPECT_NE(text.find(file.string()), std::string::npos) << text;
+  EXPECT_NE(text.find(capture_file.string()), std::string::npos) << text;
   EXPECT_NE(text.find("File too large"), std::string::npos) << text;
   EXPECT_NE(text.find("everything before is readable"), std::string::npos) << text;
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
-  const auto log = capture::read_capture(file);
+  const auto log = capture::read_capture(capture_file);
   EXPECT_EQ(log.report.damaged_chunks, 0U);
   EXPECT_GT(log.samples.size(), 100U);
   EXPECT_EQ(log.ticks.lost(), 0U);

@@ -9,6 +9,7 @@
 
 #include "common/wire/convert.hpp"
 #include "fake_rig.hpp"
+#include "firmware/controller/door.hpp"
 #include "readme_table.hpp"
 
 namespace trocar::controller {
@@ -55,6 +56,11 @@ void arrives(FakeRig& f, const Command& command, std::int64_t age_ns) {
 
 void fill(FakeRig& f, CommandKind kind, std::size_t room = 0) {
   while (f.mail->commands.size() + room < capacity::command_ring) f.mail->commands.push({.session = other, .id = 1, .kind = kind});
+}
+
+// What others send in one tick, through the door that the bridge holds.
+void storm(FakeRig& f, CommandKind kind) {
+  for (int i = 0; i < 500; ++i) (void)let_in(*f.mail, FakeRig::host, {.session = other, .id = 1, .kind = kind});
 }
 
 void silent_for(FakeRig& f, int tick, int ticks) { f.host_talks = tick >= ticks; }
@@ -111,6 +117,22 @@ std::vector<Row> rows() {
   flood("a ring full of others' commands: the host's are lost", CommandKind::Home, 0, "HostLost", Then::Holds, 81);
   flood("a Stop while the ring is full of others' commands", CommandKind::Home, 0, "Done", Then::QuickStops, 1, third_stops);
   flood("a Stop while the ring is full of others' Holds", CommandKind::Hold, 0, "Done", Then::QuickStops, 1, third_stops);
+  const auto stormed = [&](const char* what, CommandKind kind, const char* says, Then then, int limit,
+                           std::function<void(FakeRig&)> begin) {
+    all.push_back({what, says, then, limit, Start::Moving, std::move(begin), [=](FakeRig& f, int) { storm(f, kind); }});
+  };
+  const auto nothing = [](FakeRig&) {};
+  const auto third_asks = [](FakeRig& f) {
+    storm(f, CommandKind::Home);
+    EXPECT_TRUE(let_in(*f.mail, FakeRig::host, {.session = 99, .id = 2, .kind = CommandKind::Stop}));
+  };
+  const auto third_holds = [](FakeRig& f) {
+    storm(f, CommandKind::Home);
+    EXPECT_TRUE(let_in(*f.mail, FakeRig::host, {.session = 99, .id = 2, .kind = CommandKind::Hold}));
+  };
+  stormed("500 commands of others a tick, through the bridge's door", CommandKind::Home, "SessionTaken", Then::GoesOn, 1, nothing);
+  stormed("a Hold of a third one among them", CommandKind::Home, "Done", Then::Holds, 9, third_holds);
+  stormed("a Stop of a third one among them", CommandKind::Home, "Done", Then::QuickStops, 1, third_asks);
   all.push_back({"a Move that a Stop overtakes", "Stopped", Then::QuickStops, 1, Start::AtRest, [=](FakeRig& f) {
                    f.mail->commands.push(move(0.01));
                    third_stops(f);
