@@ -21,6 +21,7 @@ double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clo
 
 constexpr double bring_up_s = 10.0;
 constexpr double silence_s = 2.0;  // no samples for this long: the rig is gone
+constexpr double flight_s = 2.0;   // for a fault's flight recording to come
 constexpr std::size_t p99_window = 1000;
 
 }  // namespace
@@ -70,6 +71,7 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
   std::string why;  // of the last refusal or fault
   RigStatus status = first;
   bool stopped_by_user = false;
+  bool flight_due = false;  // a fault's flight recording follows it after a moment
   Sample sample;
 
   while (!sequencer.finished()) {
@@ -93,7 +95,9 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
                               if (e.event.kind == EventKind::FaultLatched && e.event.tick >= first_tick && first_tick != 0) {
                                 ++progress.faults;
                                 why = e.text;
+                                flight_due = true;
                               }
+                              if (e.event.kind == EventKind::FlightRecorded) flight_due = false;
                             },
                         .status = [&](const RigStatus& s) { status = s; }});
     client.keep_alive();
@@ -143,6 +147,9 @@ experiment::Run run_experiment(const ExperimentSetup& setup, std::uint32_t domai
     if (!stopped_by_user && sequencer.failed() && !why.empty()) run.outcome += ": " + why;
     client.send({.session = client.session(), .id = 0, .kind = CommandKind::Stop});
     client.poll(0.1, {});
+    const double end = steady_s() + flight_s;
+    while (flight_due && steady_s() < end)
+      client.poll(0.05, {.event = [&](const RigEvent& e) { flight_due = flight_due && e.event.kind != EventKind::FlightRecorded; }});
   }
   return run;
 }

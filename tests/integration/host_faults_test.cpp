@@ -72,8 +72,8 @@ std::vector<Row> rows_of(const std::filesystem::path& csv) {
 }
 
 TEST_F(HostFaults, FlightRecordingOfALostPlantIsOnDiskAndInTheCapture) {
+  ASSERT_TRUE(until(start_s, [&] { return sample.tick > capacity::flight_recorder; }));
   ASSERT_NO_FATAL_FAILURE(arm_and_move());
-  ASSERT_TRUE(until(react_s, [&] { return sample.tick > capacity::flight_recorder; }));
   plant->signal(SIGKILL);
   ASSERT_TRUE(until(react_s, [&] { return event(EventKind::FlightRecorded) != nullptr; }));
   armed = false;

@@ -63,7 +63,8 @@ class RunningRig : public ::testing::Test {
                  .target_pose = {0.0, 0.19, 1.5707963267948966},
                  .speed_m_s = 0.01,
                  .angular_speed_rad_s = 1.0});
-    ASSERT_TRUE(until(react_s, [&] { return sample.mode == Mode::Position && sample.velocity[1] > 0.005; })) << to_string(sample.mode);
+    ASSERT_TRUE(until(react_s, [&] { return sample.mode == Mode::Position && sample.velocity[1] > 0.005; }))
+        << to_string(sample.mode) << ": " << status.text;
   }
 
   [[nodiscard]] const host::RigEvent* event(EventKind kind) const {
