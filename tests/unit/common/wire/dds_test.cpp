@@ -58,6 +58,22 @@ TEST(Dds, CarriesABatchOfSamplesUnchanged) {
   EXPECT_FALSE(wait.wait(0ns));
 }
 
+TEST(Dds, TakesNoMoreThanItIsAskedFor) {
+  const wire::Participant participant(test_domain());
+  wire::Writer<wire::Command> writer(participant);
+  wire::Reader<wire::Command> reader(participant);
+  ASSERT_TRUE(eventually([&] { return writer.matched() == 1 && reader.matched() == 1; }));
+  std::vector<std::uint32_t> ids;
+  for (std::uint32_t id = 0; id < 200; ++id) ASSERT_TRUE(writer.write(wire::to_wire(Command{.id = id}, "", 0, 0)));
+  ASSERT_TRUE(eventually([&] { return reader.take([&](const wire::Command& c) { ids.push_back(c.id); }, 64) > 0; }));
+  EXPECT_LE(ids.size(), 64u);
+  ASSERT_TRUE(eventually([&] {
+    (void)reader.take([&](const wire::Command& c) { ids.push_back(c.id); });
+    return ids.size() == 200;
+  }));
+  for (std::uint32_t id = 0; id < 200; ++id) EXPECT_EQ(ids[id], id);  // nothing was lost in between
+}
+
 TEST(Dds, LateReaderGetsTheLastStatusAndAllEventsButNoOldCommand) {
   const wire::Participant participant(test_domain());
   wire::Writer<wire::Status> status(participant);
