@@ -21,7 +21,7 @@ inline constexpr double react_s = 10.0;  // wall time that a busy machine may ta
 class RunningRig : public ::testing::Test {
  protected:
   void SetUp() override {
-    rig_file = scratch.make_rig().string();
+    rig_file = scratch.make_rig(rig_edits).string();
     plant.emplace(scratch, "trocar-plant", std::vector<std::string>{"--rig", rig_file, "--log-drives"});
     ASSERT_TRUE(plant->wait_for("before scene", start_s)) << plant->errors();
     rig.emplace(scratch, "trocar-rig",
@@ -84,6 +84,7 @@ class RunningRig : public ::testing::Test {
 
   Scratch scratch;
   std::string domain = std::to_string(own_domain());
+  Edits rig_edits;  // before SetUp()
   std::string rig_file;
   std::filesystem::path flight_folder = scratch / "flight";
   std::filesystem::path capture_file = scratch / "capture.mcap";
