@@ -67,7 +67,8 @@ void run_rig(Process& p, controller::Controller& controller, LoopWatch& watch) {
   run_loop(p.rig, link, inputs, controller, watch, [&](std::uint64_t tick, const LoopCounters& loop) {
     p.mail.samples.push(controller.sample());
     if (tick % ticks_per_tally == 0)
-      p.shared.snapshots.push({controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational, link.bus_report(), loop});
+      p.shared.snapshots.push(
+          {controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational, link.bus_report(), loop});
     if (until_shutdown > 0) --until_shutdown;
     if (until_shutdown < 0 && stop_asked.load(std::memory_order_relaxed)) {
       p.mail.commands.push({.session = 0, .id = 0, .kind = CommandKind::Stop});
