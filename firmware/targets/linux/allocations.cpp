@@ -1,4 +1,4 @@
-#include "allocations.hpp"
+#include "firmware/targets/linux/allocations.hpp"
 
 #include <cerrno>
 #include <cstddef>

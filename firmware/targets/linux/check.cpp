@@ -1,4 +1,4 @@
-#include "check.hpp"
+#include "firmware/targets/linux/check.hpp"
 
 #include <fmt/format.h>
 #include <netinet/in.h>
@@ -18,9 +18,9 @@
 #include "common/config/user_error.hpp"
 #include "common/mechanism/twin.hpp"
 #include "firmware/controller/controller.hpp"
+#include "firmware/targets/linux/loop.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/rig_link.hpp"
-#include "loop.hpp"
 
 namespace trocar {
 

@@ -12,8 +12,8 @@
 
 #include "common/core/contracts.hpp"
 #include "common/rig/rig.hpp"
+#include "firmware/targets/linux/loop_watch.hpp"
 #include "hal/realtime/setup.hpp"
-#include "loop_watch.hpp"
 
 namespace trocar {
 

@@ -4,14 +4,14 @@
 #include <cstdint>
 #include <span>
 
-#include "allocations.hpp"
 #include "common/core/contracts.hpp"
 #include "common/rig/rig.hpp"
 #include "firmware/controller/controller.hpp"
 #include "firmware/safety/modes.hpp"
+#include "firmware/targets/linux/allocations.hpp"
+#include "firmware/targets/linux/loop_watch.hpp"
 #include "hal/realtime/clock.hpp"
 #include "hal/realtime/counters.hpp"
-#include "loop_watch.hpp"
 
 namespace trocar {
 

@@ -1,4 +1,4 @@
-#include "loop_watch.hpp"
+#include "firmware/targets/linux/loop_watch.hpp"
 
 #include <unistd.h>
 

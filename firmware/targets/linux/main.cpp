@@ -14,7 +14,6 @@
 #include <span>
 #include <string>
 
-#include "check.hpp"
 #include "common/config/new_file.hpp"
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
@@ -23,12 +22,13 @@
 #include "firmware/bridge/bridge.hpp"
 #include "firmware/controller/controller.hpp"
 #include "firmware/model_watch/model_watch.hpp"
+#include "firmware/targets/linux/check.hpp"
+#include "firmware/targets/linux/loop.hpp"
+#include "firmware/targets/linux/loop_watch.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
 #include "hal/realtime/setup.hpp"
 #include "hal/rig_link.hpp"
-#include "loop.hpp"
-#include "loop_watch.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "loop.hpp"
+#include "firmware/targets/linux/loop.hpp"
 
 namespace trocar {
 namespace {
