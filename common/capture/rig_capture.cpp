@@ -97,6 +97,9 @@ RigLog read_capture(const std::filesystem::path& path) {
       } else if (topic == wire::events_topic.name) {
         const Decoded<wire::Event> event(message.data);
         log.events.push_back({wire::from_wire(*event), event->text});
+      } else if (topic == wire::status_topic.name) {
+        const Decoded<wire::Status> status(message.data);
+        if (status->machine[0] != '\0') log.machine = {status->machine, static_cast<bool>(status->real_time), wire::loop_of(*status)};
       }
     } catch (const CdrError& error) {
       problems.push_back(topic + " message " + std::to_string(message.sequence) + " does not decode: " + error.what());

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -72,10 +73,18 @@ struct EventRecord {
   std::string text;
 };
 
+// What the controller said last about the machine that it runs on.
+struct MachineRecord {
+  std::string text;
+  bool real_time{};
+  LoopCounters loop{};  // since its start
+};
+
 struct RigLog {
   std::vector<trocar::Sample> samples;
   std::vector<trocar::Sample> flight;  // of all flight recordings, one after the other
   std::vector<EventRecord> events;
+  std::optional<MachineRecord> machine;  // none in lock-step, nor in captures of versions that did not say
   TickCounter ticks;
   std::uint64_t dropped_by_controller{};          // samples that the controller itself had no room for
   std::map<std::string, std::uint64_t> messages;  // by topic

@@ -160,6 +160,18 @@ struct Sample {
   float tick_us{};                // execution time of the tick, 0 in lock-step
 };
 
+// What the machine did to the thread that ticks, since its loop began; sampled between ticks, and not every one of them.
+struct LoopCounters {
+  std::uint64_t overruns{};      // ticks that ended after the next one was due
+  std::uint64_t minor_faults{};  // page faults served from memory
+  std::uint64_t major_faults{};  // page faults served from a disk
+  std::uint64_t preemptions{};   // taken off its core while it had work to do
+  std::uint64_t allocations{};   // calls of malloc and its kin
+  // While the drives had torque: these two must stay at zero.
+  std::uint64_t armed_page_faults{};
+  std::uint64_t armed_allocations{};
+};
+
 [[nodiscard]] constexpr const char* to_string(Mode m) noexcept {
   constexpr std::array<const char*, 7> names{"Off", "Ready", "Armed", "Position", "Haptic", "Hold", "Fault"};
   return static_cast<std::size_t>(m) < names.size() ? names[static_cast<std::size_t>(m)] : "?";

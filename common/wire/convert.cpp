@@ -77,6 +77,26 @@ To sample_as(const From& from) noexcept {
 Sample to_wire(const trocar::Sample& sample) noexcept { return sample_as<Sample>(sample); }
 trocar::Sample from_wire(const Sample& sample) noexcept { return sample_as<trocar::Sample>(sample); }
 
+void put_loop(const LoopCounters& loop, Status& status) noexcept {
+  status.overruns = loop.overruns;
+  status.minor_faults = loop.minor_faults;
+  status.major_faults = loop.major_faults;
+  status.preemptions = loop.preemptions;
+  status.allocations = loop.allocations;
+  status.armed_page_faults = loop.armed_page_faults;
+  status.armed_allocations = loop.armed_allocations;
+}
+
+LoopCounters loop_of(const Status& s) noexcept {
+  return {.overruns = s.overruns,
+          .minor_faults = s.minor_faults,
+          .major_faults = s.major_faults,
+          .preemptions = s.preemptions,
+          .allocations = s.allocations,
+          .armed_page_faults = s.armed_page_faults,
+          .armed_allocations = s.armed_allocations};
+}
+
 Event to_wire(const trocar::Event& event, std::string_view text) noexcept {
   Event out{};
   out.protocol = protocol_version;

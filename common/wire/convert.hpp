@@ -16,6 +16,9 @@ namespace trocar::wire {
 [[nodiscard]] Sample to_wire(const trocar::Sample& sample) noexcept;
 [[nodiscard]] trocar::Sample from_wire(const Sample& sample) noexcept;
 
+void put_loop(const LoopCounters& loop, Status& status) noexcept;
+[[nodiscard]] LoopCounters loop_of(const Status& status) noexcept;
+
 [[nodiscard]] Event to_wire(const trocar::Event& event, std::string_view text = {}) noexcept;
 [[nodiscard]] trocar::Event from_wire(const Event& event) noexcept;
 

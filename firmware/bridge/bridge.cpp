@@ -84,6 +84,17 @@ double load_percent(std::uint64_t bits, std::uint64_t ticks, const rig::Rig& rig
   return 100.0 * static_cast<double>(bits) / (static_cast<double>(ticks) * rig::bus_budget(rig).bits_per_tick);
 }
 
+// Told, but no fault: what a page fault or an allocation can do to the motion is to make a tick late, and of that there is a measure with a
+// limit (LateTick). To stop a machine for one that did no harm would be a hazard of its own; on a machine without locked memory they are
+// usual.
+std::string armed_disturbance(const LoopCounters& loop) {
+  if (loop.armed_page_faults == 0 && loop.armed_allocations == 0) return {};
+  return fmt::format(
+      "{} page faults and {} allocations in the loop while armed, where none should be: let trocar-rig lock its memory (trocar "
+      "rig check says how)",
+      loop.armed_page_faults, loop.armed_allocations);
+}
+
 }  // namespace
 
 struct Bridge::Entities {
@@ -120,9 +131,10 @@ Bridge::~Bridge() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Bridge::report_real_time(bool complete, std::string missing) {
+void Bridge::report_real_time(bool complete, std::string missing, std::string machine) {
   real_time_ = complete;
   real_time_text_ = std::move(missing);
+  machine_ = std::move(machine);
   real_time_known_.store(true, std::memory_order_release);
 }
 
@@ -216,7 +228,8 @@ void Bridge::publish_rest() {
   } else if (!s.homed) {
     text = "not homed";
   } else if (real_time_known_.load(std::memory_order_acquire)) {
-    text = real_time_text_;
+    text = armed_disturbance(snapshot_.loop);
+    if (text.empty()) text = real_time_text_;
   }
   wire::Status message{};
   message.protocol = protocol_version;
@@ -243,6 +256,8 @@ void Bridge::publish_rest() {
   }
   message.drives_bus_percent = static_cast<float>(drives_percent_);
   message.sensor_bus_percent = static_cast<float>(sensor_percent_);
+  wire::put_loop(snapshot_.loop, message);
+  if (real_time_known_.load(std::memory_order_acquire)) wire::copy_text(message.machine, machine_);
   (void)entities_->status.write(message);
 }
 

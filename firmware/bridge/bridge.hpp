@@ -22,6 +22,7 @@ struct Shared {
     hal::canopen::DriveReport drives{};
     bool operational{};
     hal::BusReport buses{};
+    LoopCounters loop{};
   };
   Ring<Snapshot, 16> snapshots;  // one every few ticks; a full ring drops, the next one says the same
   std::atomic<bool> finished{false};
@@ -36,8 +37,8 @@ class Bridge {
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  // Once: whether the real-time set-up is complete, and what it did not get.
-  void report_real_time(bool complete, std::string missing);
+  // Once: whether the real-time set-up is complete, what it did not get, and on what machine.
+  void report_real_time(bool complete, std::string missing, std::string machine);
 
  private:
   struct Entities;
@@ -51,8 +52,8 @@ class Bridge {
   controller::Mailboxes& mail_;
   Shared& shared_;
   bool real_time_{};
-  std::string real_time_text_;
-  std::atomic<bool> real_time_known_{false};  // releases the two above
+  std::string real_time_text_, machine_;
+  std::atomic<bool> real_time_known_{false};  // releases the three above
   Shared::Snapshot snapshot_{};
   hal::BusReport measured_buses_{};  // when their load was measured last
   double drives_percent_{}, sensor_percent_{};

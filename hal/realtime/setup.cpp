@@ -42,6 +42,13 @@ constexpr std::array<Text, item_count> texts{{
 
 }  // namespace
 
+bool leave_core(int cpu) noexcept {
+  cpu_set_t cores;
+  if (cpu < 0 || cpu >= CPU_SETSIZE || ::sched_getaffinity(0, sizeof cores, &cores) != 0) return false;
+  CPU_CLR(static_cast<std::size_t>(cpu), &cores);
+  return CPU_COUNT(&cores) > 0 && ::sched_setaffinity(0, sizeof cores, &cores) == 0;
+}
+
 Setup::~Setup() {
   if (latency_file_ >= 0) ::close(latency_file_);
 }

@@ -30,6 +30,10 @@ struct Outcome {
   std::int32_t error_number{};  // errno of the refusal, 0 if there is none to tell
 };
 
+// Takes a core away from the calling thread, and so from all threads that it starts from now on: the loop is to be alone on its own. The
+// thread that runs the loop goes there by Setup::apply. False, and nothing has changed, when no other core is left or the kernel refuses.
+bool leave_core(int cpu) noexcept;
+
 class Setup {
  public:
   Setup() noexcept = default;

@@ -239,8 +239,8 @@ void print_summary(const report::Summary& s) {
     fmt::print("sag, {:<29} {:.2f} mm; F/Kp is {:.2f} mm for the {:.2f} N at the base, {:.2f} mm with the friction of the mechanism\n",
                g.phase, 1e3 * g.error_m, 1e3 * g.expected_m, g.force_n, 1e3 * g.expected_command_m);
   if (s.tick_us.count > 0)
-    fmt::print("tick p50 {:.0f} us, p99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us\n", s.tick_us.p50, s.tick_us.p99,
-               s.wakeup_late_us.p50, s.wakeup_late_us.p99);
+    fmt::print("tick p50 {:.0f} us, p99 {:.0f} us, p99.99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us, p99.99 {:.0f} us\n",
+               s.tick_us.p50, s.tick_us.p99, s.tick_us.p99_99, s.wakeup_late_us.p50, s.wakeup_late_us.p99, s.wakeup_late_us.p99_99);
   fmt::print("{} samples, {} lost, {} ticks without feedback, faults: {}\n", s.samples, s.lost_ticks, s.ticks_without_feedback,
              s.faults.empty() ? "none" : fmt::format("{}", fmt::join(s.faults, ", ")));
 }
@@ -261,6 +261,7 @@ int make_report(const std::filesystem::path& folder, bool json) {
   info.needle_length_m = run.placement.needle_length_m;
   info.kp_n_per_m = run.thesis_stiffness_n_per_m;
   info.notes = run.notes;
+  if (log.machine && !run.lockstep) info.machine = {log.machine->text, log.machine->real_time, log.machine->loop};
   info.gains = run.phases.empty() ? "" : run.phases.front().gain_set;
   double insertion_speed_m_s = 0.0;  // a withdrawal belongs to the insertion before it, whatever its own speed
   for (const auto& p : run.phases) {

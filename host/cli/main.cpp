@@ -13,6 +13,7 @@
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
 #include "host/capture/recorder.hpp"
+#include "host/cli/check_command.hpp"
 #include "host/cli/demo.hpp"
 #include "host/cli/insert_command.hpp"
 #include "host/cli/needle_command.hpp"
@@ -236,6 +237,23 @@ int main(int argc, char** argv) {
   };
   add_rig("info", "what a rig file describes: workspace, resolution, forces, bus load\nExample: trocar rig info ubc_twin_haptic",
           [&] { return cli::rig_info(rig, json); });
+  cli::RigCheckOptions check;
+  add_rig("check",
+          "whether this machine is fit for motors: runs the controller's loop without the rig, and says how late it woke up, how long its "
+          "ticks took, and what to mend; exit code 0 fit for motors, 1 only for simulation\nExample: trocar rig check ubc_twin --load",
+          [&] {
+            check.rig = rig;
+            check.json = json;
+            return cli::rig_check(check, stop_asked);
+          });
+  auto* check_command = rig_command->get_subcommand("check");
+  check_command->remove_option(check_command->get_option("--domain"));  // nothing of it crosses DDS
+  check_command->add_option("--seconds", check.seconds, "how long; 99.99 % means something from 10000 ticks on")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  check_command->add_option("--cpu", check.cpu, "core to run the loop on, as trocar-rig is going to be started")
+      ->check(CLI::NonNegativeNumber);
+  check_command->add_flag("--load", check.load, "keep all cores, the memory and a disk busy meanwhile");
   add_rig("status", "what the running controller is doing", [&] { return cli::rig_status(domain_of(), json); });
   add_rig("home", "take the encoder offsets; the handle stands in its jig", [&] { return cli::rig_home(domain_of()); });
   add_rig("arm", "enable torque and stay armed until Ctrl-C", [&] { return cli::rig_arm(domain_of(), stop_asked); });

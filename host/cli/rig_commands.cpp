@@ -101,20 +101,30 @@ int rig_info(const std::string& name, bool json) {
   return 0;
 }
 
+namespace {
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += (c == '"' || c == '\\') ? fmt::format("\\{}", c) : std::string(1, c);
+  return out;
+}
+}  // namespace
+
 int rig_status(std::uint32_t domain, bool json) {
   host::RigClient client(domain);
   const host::RigStatus s = client.wait_for_rig(find_rig_s);
   if (json) {
-    std::string text;
-    for (const char c : s.text) text += (c == '"' || c == '\\') ? fmt::format("\\{}", c) : std::string(1, c);
     fmt::print(
         "{{\"rig\": \"{}\", \"mode\": \"{}\", \"fault\": \"{}\", \"homed\": {}, \"tared\": {}, \"real_time\": {}, \"armed_by\": "
         "\"{:016x}\", \"tick\": {}, "
-        "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"drives_bus_percent\": {:.1f}, \"sensor_bus_percent\": {:.1f}, \"gains\": "
-        "\"{}\", "
-        "\"text\": \"{}\"}}\n",
+        "\"ticks_late\": {}, \"ticks_without_feedback\": {}, \"drives_bus_percent\": {:.1f}, \"sensor_bus_percent\": {:.1f}, \"overruns\": "
+        "{}, \"minor_faults\": {}, \"major_faults\": {}, "
+        "\"preemptions\": "
+        "{}, \"allocations\": {}, \"armed_page_faults\": {}, \"armed_allocations\": {}, \"machine\": \"{}\", \"gains\": \"{}\", \"text\": "
+        "\"{}\"}}\n",
         s.rig, to_string(s.mode), to_string(s.fault), s.homed, s.tared, s.real_time, s.session, s.tick, s.ticks_late,
-        s.ticks_without_feedback, s.drives_bus_percent, s.sensor_bus_percent, s.gain_set, text);
+        s.ticks_without_feedback, s.drives_bus_percent, s.sensor_bus_percent, s.loop.overruns, s.loop.minor_faults, s.loop.major_faults,
+        s.loop.preemptions, s.loop.allocations, s.loop.armed_page_faults, s.loop.armed_allocations, escaped(s.machine), s.gain_set,
+        escaped(s.text));
     return 0;
   }
   fmt::print("{}: mode {}", s.rig, to_string(s.mode));
@@ -124,6 +134,11 @@ int rig_status(std::uint32_t domain, bool json) {
              s.session != 0 ? fmt::format("armed by session {:016x}", s.session) : "nobody is armed");
   fmt::print("measured bus load: drives {:.1f} %, sensor {:.1f} % (trocar rig info has the budget)\n", s.drives_bus_percent,
              s.sensor_bus_percent);
+  fmt::print(
+      "loop: {} overruns, {} preemptions; page faults {} minor, {} major; {} allocations; while armed {} page faults, {} allocations\n",
+      s.loop.overruns, s.loop.preemptions, s.loop.minor_faults, s.loop.major_faults, s.loop.allocations, s.loop.armed_page_faults,
+      s.loop.armed_allocations);
+  if (!s.machine.empty()) fmt::print("on {}\n", s.machine);
   if (!s.text.empty()) fmt::print("{}\n", s.text);
   return 0;
 }

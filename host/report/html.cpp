@@ -167,14 +167,29 @@ std::string timing_table(const RunInfo& run, const Summary& summary) {
   const auto add = [&](const char* name, const Distribution& d) {
     if (d.count == 0) {
       const std::string why = run.lockstep ? "<span class=\"none\">a virtual clock has none</span>" : none;
-      rows += row({name, why, why, why});
+      rows += row({name, why, why, why, why});
     } else {
-      rows += row({name, number(d.p50, 1, "µs"), number(d.p99, 1, "µs"), number(d.max, 1, "µs")});
+      rows += row({name, number(d.p50, 1, "µs"), number(d.p99, 1, "µs"), number(d.p99_99, 1, "µs"), number(d.max, 1, "µs")});
     }
   };
   add("Tick, execution time", summary.tick_us);
   add("Wake-up, lateness", summary.wakeup_late_us);
-  return table({"", "Median", "99&nbsp;%", "Greatest"}, rows);
+  return table({"", "Median", "99&nbsp;%", "99.99&nbsp;%", "Greatest"}, rows);
+}
+
+std::string machine_table(const RunInfo& run) {
+  if (!run.machine) return {};
+  const LoopCounters& loop = run.machine->loop;
+  std::string rows;
+  rows += row({"Controller ran on", escaped(run.machine->text)});
+  rows += row({"Verdict", run.machine->real_time ? "real-time set-up complete"
+                                                 : "<b>only for simulation</b>: the real-time set-up is not complete (trocar rig check)"});
+  rows += row({"Ticks that ended after the next one was due", fmt::format("{}", loop.overruns)});
+  rows += row({"Page faults of the loop",
+               fmt::format("{} minor, {} major; {} while armed", loop.minor_faults, loop.major_faults, loop.armed_page_faults)});
+  rows += row({"Allocations of the loop", fmt::format("{}; {} while armed", loop.allocations, loop.armed_allocations)});
+  rows += row({"Loop taken off its core", fmt::format("{} times", loop.preemptions)});
+  return table({"Machine", "since the controller's start"}, rows);
 }
 
 std::string counts_table(const Summary& s) {
@@ -250,7 +265,7 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
     out += "<h2>Course of the run</h2>\n";
     figure("overview.svg");
   }
-  out += "<h2>Timing</h2>\n" + timing_table(run, summary);
+  out += "<h2>Timing</h2>\n" + timing_table(run, summary) + machine_table(run);
   figure("tick_time.svg");
   figure("wakeup.svg");
   out += "<h2>Completeness</h2>\n" + counts_table(summary);

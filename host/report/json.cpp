@@ -49,7 +49,23 @@ std::string json(const Tracking& t) {
 }
 
 std::string json(const Distribution& d) {
-  return object({{"count", std::to_string(d.count)}, {"p50", number(d.p50)}, {"p99", number(d.p99)}, {"max", number(d.max)}});
+  return object({{"count", std::to_string(d.count)},
+                 {"p50", number(d.p50)},
+                 {"p99", number(d.p99)},
+                 {"p99_99", number(d.p99_99)},
+                 {"max", number(d.max)}});
+}
+
+std::string json(const Machine& m) {
+  return object({{"text", text(m.text)},
+                 {"real_time", m.real_time ? "true" : "false"},
+                 {"overruns", std::to_string(m.loop.overruns)},
+                 {"minor_faults", std::to_string(m.loop.minor_faults)},
+                 {"major_faults", std::to_string(m.loop.major_faults)},
+                 {"preemptions", std::to_string(m.loop.preemptions)},
+                 {"allocations", std::to_string(m.loop.allocations)},
+                 {"armed_page_faults", std::to_string(m.loop.armed_page_faults)},
+                 {"armed_allocations", std::to_string(m.loop.armed_allocations)}});
 }
 
 std::string json(const Insertion& i) {
@@ -126,6 +142,7 @@ std::string to_json(const RunInfo& run, const Summary& s) {
   members.emplace_back("step_m", number(s.step_m));
   members.emplace_back("tick_us", json(s.tick_us));
   members.emplace_back("wakeup_late_us", json(s.wakeup_late_us));
+  members.emplace_back("machine", run.machine ? json(*run.machine) : "null");
   members.emplace_back("notes", array(run.notes, [](const std::string& n) { return text(n); }));
   return object(members) + "\n";
 }

@@ -40,6 +40,12 @@ struct Truth {  // what a simulation knows of a tick
   std::array<double, 3> hand_wrench{};  // N, N, N m on the handle, rig frame
 };
 
+struct Machine {  // what the controller said of the machine that it ran on
+  std::string text;
+  bool real_time{};
+  LoopCounters loop{};  // since the controller's start
+};
+
 struct RunInfo {
   std::filesystem::path folder;
   enum class Kind { Insertion, Haptic } kind = Kind::Insertion;
@@ -52,6 +58,7 @@ struct RunInfo {
   std::string sag_gain_set = "thesis";  // the set whose sag F/Kp is reported
   double kp_n_per_m{};                  // its proportional gain; 0: no sag is reported
   std::vector<Truth> truth;             // increasing ticks; empty for a rig that is no lock-step simulation
+  std::optional<Machine> machine;       // none in lock-step
   std::vector<std::string> notes;
 };
 
@@ -65,7 +72,7 @@ struct Tracking {
 
 struct Distribution {  // nearest rank
   std::uint64_t count{};
-  double p50 = not_measured, p99 = not_measured, max = not_measured;
+  double p50 = not_measured, p99 = not_measured, p99_99 = not_measured, max = not_measured;
 };
 
 struct LineFit {  // least squares: force = intercept + slope * depth

@@ -120,11 +120,12 @@ double withdrawal_force(const RunInfo& run, std::span<const Sample> samples) {
 Distribution distribution(std::vector<double> values) {
   if (values.empty()) return {};
   const auto rank = [&](double p) {
-    const auto index = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size()))) - 1;
+    // Less a rounding error, or 0.9999 of 10000 values would be the last.
+    const auto index = static_cast<std::size_t>(std::ceil(p * static_cast<double>(values.size()) - 1e-6)) - 1;
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index), values.end());
     return values[index];
   };
-  return {values.size(), rank(0.50), rank(0.99), *std::ranges::max_element(values)};
+  return {values.size(), rank(0.50), rank(0.99), rank(0.9999), *std::ranges::max_element(values)};
 }
 
 // One count of one encoder, seen from the base: ticks in which exactly one count moved.

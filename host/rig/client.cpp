@@ -47,7 +47,9 @@ RigStatus from_wire(const wire::Status& s) {
           s.gain_set,
           s.text,
           static_cast<double>(s.drives_bus_percent),
-          static_cast<double>(s.sensor_bus_percent)};
+          static_cast<double>(s.sensor_bus_percent),
+          wire::loop_of(s),
+          s.machine};
 }
 
 }  // namespace

@@ -22,6 +22,8 @@ struct RigStatus {
   std::string gain_set;
   std::string text;
   double drives_bus_percent{}, sensor_bus_percent{};  // measured load
+  LoopCounters loop{};
+  std::string machine;  // kernel and core of the loop, what of the real-time set-up is missing
 };
 
 struct RigReply {

@@ -2,6 +2,7 @@
 // once a period until it is told to stop.
 #include <fmt/format.h>
 #include <sys/prctl.h>
+#include <sys/utsname.h>
 #include <CLI/CLI.hpp>
 
 #include <array>
@@ -13,6 +14,7 @@
 #include <span>
 #include <string>
 
+#include "common/config/new_file.hpp"
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
@@ -20,6 +22,9 @@
 #include "firmware/bridge/bridge.hpp"
 #include "firmware/controller/controller.hpp"
 #include "firmware/model_watch/model_watch.hpp"
+#include "firmware/targets/linux/check.hpp"
+#include "firmware/targets/linux/loop.hpp"
+#include "firmware/targets/linux/loop_watch.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
 #include "hal/realtime/setup.hpp"
@@ -43,6 +48,8 @@ struct Options {
   std::string model;
   std::string flight = "flight";
   bool open_network{};
+  double check_s{};
+  std::string out;
 };
 
 // Everything of fixed size that the loop uses, in one block that the memory lock covers.
@@ -54,48 +61,74 @@ struct Process {
   hal::EndpointBus drives, sensor;
 };
 
-void run_loop(Process& p, controller::Controller& controller) {
+void run_rig(Process& p, controller::Controller& controller, LoopWatch& watch) {
   hal::RigLink<hal::EndpointBus> link(p.rig, p.drives, p.sensor);
-  const auto period_ns = static_cast<std::int64_t>(1e9 / p.rig.timing.tick_hz);
-  const std::int64_t deadline_ns = 1000 * static_cast<std::int64_t>(p.rig.timing.feedback_deadline_us);
   const std::array<int, 2> inputs{p.drives.file_descriptor(), p.sensor.file_descriptor()};
-  const std::int64_t start_ns = rt::monotonic_now_ns();
-  std::int64_t next_ns = start_ns + period_ns;
   int until_shutdown = -1;  // ticks left after a stop was asked, so that braking and disabling get their time
-
-  for (std::uint64_t tick = 0; until_shutdown != 0; ++tick) {
-    rt::sleep_until(next_ns);
-    const std::int64_t woke_ns = rt::monotonic_now_ns();
-    link.begin_tick(woke_ns);
-    while (!link.poll(rt::monotonic_now_ns())) {
-      const std::int64_t now = rt::monotonic_now_ns();
-      if (now >= woke_ns + deadline_ns) break;
-      rt::wait_for_input(inputs, woke_ns + deadline_ns);
-    }
-    const std::int64_t begin_ns = rt::monotonic_now_ns();
-    const hal::LinkCommand& command = controller.tick({woke_ns - start_ns, woke_ns - next_ns, &link.feedback()});
-    link.end_tick(rt::monotonic_now_ns(), command);
-    const std::int64_t end_ns = rt::monotonic_now_ns();
-
-    Sample& sample = controller.sample();
-    sample.tick_us = static_cast<float>(1e-3 * static_cast<double>(end_ns - begin_ns));
-    p.mail.samples.push(sample);
-    if (tick % 8 == 0)
+  run_loop(p.rig, link, inputs, controller, watch, [&](std::uint64_t tick, const LoopCounters& loop) {
+    p.mail.samples.push(controller.sample());
+    if (tick % ticks_per_tally == 0)
       p.shared.snapshots.push(
-          {controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational, link.bus_report()});
-
-    // A missed period is not made up for by a burst: the schedule moves on.
-    next_ns += period_ns;
-    if (end_ns > next_ns + period_ns) next_ns = end_ns - (end_ns - next_ns) % period_ns + period_ns;
-
+          {controller.status(), link.report(), link.feedback().state == hal::LinkState::Operational, link.bus_report(), loop});
     if (until_shutdown > 0) --until_shutdown;
     if (until_shutdown < 0 && stop_asked.load(std::memory_order_relaxed)) {
       controller.stop();
       until_shutdown = static_cast<int>(0.5 * p.rig.timing.tick_hz);
     }
     if (until_shutdown > 1 && !safety::has_torque(controller.status().mode)) until_shutdown = 1;
-  }
+    return until_shutdown != 0;
+  });
   link.shut_down(rt::monotonic_now_ns());
+}
+
+// Asks for the set-up and says on stderr what was refused. Returns the same as one line.
+std::string set_up(rt::Setup& setup, const Options& options) {
+  setup.apply({options.priority, options.cpu});
+  std::string missing;
+  for (std::size_t i = 0; i < rt::item_count; ++i) {
+    const auto item = static_cast<rt::Item>(i);
+    const rt::Outcome& outcome = setup.outcome(item);
+    if (!outcome.asked || outcome.obtained) continue;
+    std::array<char, 256> line{};
+    rt::describe(item, outcome, line);
+    fmt::print(stderr, "trocar-rig: {}\n", line.data());
+    missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
+  }
+  return missing;
+}
+
+// Root on a stock kernel is granted the rest and still wakes up some ms late: without PREEMPT_RT the best-effort limit judges.
+bool is_real_time(const rt::Setup& setup) { return setup.complete() && setup.outcome(rt::Item::Kernel).obtained; }
+
+std::string machine(const rt::Setup& setup, const Options& options, const std::string& missing) {
+  utsname name{};
+  uname(&name);
+  return fmt::format("{} {}, {}, {}, {}; {}", name.sysname, name.release,
+                     setup.outcome(rt::Item::Kernel).obtained ? "PREEMPT_RT" : "not PREEMPT_RT",
+                     setup.outcome(rt::Item::Affinity).obtained ? fmt::format("core {}", options.cpu) : "any core",
+                     setup.outcome(rt::Item::Scheduler).obtained ? fmt::format("SCHED_FIFO {}", options.priority) : "ordinary scheduling",
+                     missing.empty() ? "real-time set-up complete" : missing);
+}
+
+int check(const Options& options) {
+  const rig::Rig rig = config::read_twin(config::find_share("rigs", options.rig));
+  std::optional<config::NewFile> out;
+  if (!options.out.empty()) out.emplace(options.out);
+  CheckFigures figures;
+  reserve(rig, options.check_s, figures);
+  if (options.cpu >= 0) rt::leave_core(options.cpu);
+  LoopWatch watch(stall_limit_ns(rig, false));
+  rt::Setup setup;
+  set_up(setup, options);
+  run_check(rig, options.check_s, is_real_time(setup), watch, stop_asked, figures);
+  const std::string text = to_toml(rig, setup, options.cpu, is_real_time(setup), std::move(figures));
+  if (out) {
+    out->stream() << text;
+    out->keep();
+  } else {
+    fmt::print("{}", text);
+  }
+  return 0;
 }
 
 int run(const Options& options) {
@@ -115,6 +148,8 @@ int run(const Options& options) {
   open(p.drives, p.rig.buses.drives, "drives", drive_ids.all());
   open(p.sensor, p.rig.buses.sensor, "sensor", hal::ati::received_ids(p.rig.buses.sensor_base_id));
 
+  if (options.cpu >= 0 && !rt::leave_core(options.cpu))
+    fmt::print(stderr, "trocar-rig: core {} cannot be left to the loop alone: this process has no other one (taskset -p)\n", options.cpu);
   virtual_needle::VirtualNeedle needle({p.rig.haptic.fade_s});
   std::optional<model_watch::ModelWatch> model;
   if (!options.model.empty())
@@ -126,28 +161,21 @@ int run(const Options& options) {
         "keys "
         "makes them), or add --open-network where nobody else can be");
   bridge::Bridge bridge(p.rig, p.mail, p.shared, options.flight);
+  LoopWatch watch(stall_limit_ns(p.rig, !options.best_effort));
   rt::Setup setup;
-  setup.apply({options.priority, options.cpu});
-  std::string missing;
-  for (std::size_t i = 0; i < rt::item_count; ++i) {
-    const auto item = static_cast<rt::Item>(i);
-    const rt::Outcome& outcome = setup.outcome(item);
-    std::array<char, 256> line{};
-    rt::describe(item, outcome, line);
-    if (outcome.asked && !outcome.obtained) fmt::print(stderr, "trocar-rig: {}\n", line.data());
-    if (outcome.asked && !outcome.obtained) missing += missing.empty() ? line.data() : fmt::format("; {}", line.data());
-  }
-  // Root on a stock kernel is granted the rest and still wakes up some ms late: without PREEMPT_RT the best-effort limit judges.
-  const bool real_time = setup.complete() && setup.outcome(rt::Item::Kernel).obtained;
+  const std::string missing = set_up(setup, options);
+  const bool real_time = is_real_time(setup);
   if (!real_time && !options.best_effort)
-    throw config::UserError("the real-time set-up is incomplete (above): mend that, or add --best-effort when no motor is connected");
+    throw config::UserError(
+        "the real-time set-up is incomplete (above): mend that (trocar rig check says more), or add --best-effort when no motor is "
+        "connected");
 
   controller::Controller controller(p.rig, p.mail, real_time, &needle);
-  bridge.report_real_time(real_time, missing);
+  bridge.report_real_time(real_time, missing, machine(setup, options, missing));
   fmt::print("trocar-rig: {} at {:g} Hz, DDS domain {}, {}\n", p.rig.name.data(), p.rig.timing.tick_hz, p.rig.dds_domain,
              real_time ? "real-time set-up complete" : "best effort");
   std::fflush(stdout);
-  run_loop(p, controller);
+  run_rig(p, controller, watch);
   fmt::print("trocar-rig: stopped in mode {}\n", to_string(controller.status().mode));
   return 0;
 }
@@ -168,6 +196,12 @@ int main(int argc, char** argv) {
   app.add_option("--priority", options.priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
   app.add_flag("--open-network", options.open_network, "accept a network without keys (CYCLONEDDS_URI set, TROCAR_KEYS not)");
   app.add_flag("--best-effort", options.best_effort, "go on when the machine refuses part of the real-time set-up");
+  auto* check_option =
+      app.add_option("--check", options.check_s,
+                     "run the loop for so many seconds without the rig, print as TOML what was granted and measured, and end "
+                     "(trocar rig check shows it)")
+          ->check(CLI::Range(0.1, 3600.0));
+  app.add_option("--out", options.out, "file for that, instead of stdout")->needs(check_option);
   app.add_flag("--die-with-parent", die_with_parent, "stop orderly when the process that started this one ends");
   try {
     app.parse(argc, argv);
@@ -179,7 +213,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, on_signal);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of its writer, not the end of the controller
   try {
-    return run(options);
+    return options.check_s > 0.0 ? check(options) : run(options);
   } catch (const std::exception& e) {
     fmt::print(stderr, "trocar-rig: {}\n", e.what());
     return 1;

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "hal/realtime/clock.hpp"
+#include "hal/realtime/counters.hpp"
 #include "hal/realtime/setup.hpp"
 
 namespace trocar::hal::realtime {
@@ -50,6 +51,58 @@ TEST(Setup, ReportsExactlyWhatTheKernelGranted) {
     }
   }}.join();
   ::munlockall();
+}
+
+// In threads of their own, which take their cores with them.
+TEST(LeaveCore, LeavesTheOthersAndTheNextThreadsToo) {
+  std::thread{[] {
+    cpu_set_t before;
+    ASSERT_EQ(::sched_getaffinity(0, sizeof before, &before), 0);
+    if (CPU_COUNT(&before) < 2) GTEST_SKIP() << "this machine gives one core only";
+    int core = 0;
+    while (!CPU_ISSET(static_cast<std::size_t>(core), &before)) ++core;
+    EXPECT_TRUE(leave_core(core));
+    cpu_set_t after;
+    std::thread{[&after] { ::sched_getaffinity(0, sizeof after, &after); }}.join();
+    CPU_CLR(static_cast<std::size_t>(core), &before);
+    EXPECT_TRUE(CPU_EQUAL(&before, &after));
+  }}.join();
+}
+
+TEST(LeaveCore, KeepsTheLastOneAndRefusesWhatIsNone) {
+  std::thread{[] {
+    cpu_set_t cores;
+    ASSERT_EQ(::sched_getaffinity(0, sizeof cores, &cores), 0);
+    int core = 0;
+    while (!CPU_ISSET(static_cast<std::size_t>(core), &cores)) ++core;
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<std::size_t>(core), &one);
+    ASSERT_EQ(::sched_setaffinity(0, sizeof one, &one), 0);
+    EXPECT_FALSE(leave_core(core));
+    EXPECT_FALSE(leave_core(-1));
+    EXPECT_FALSE(leave_core(100000));
+    cpu_set_t after;
+    ::sched_getaffinity(0, sizeof after, &after);
+    EXPECT_TRUE(CPU_EQUAL(&one, &after));
+  }}.join();
+}
+
+// Memory that was never touched costs a fault a page, in the thread that touches it and in no other.
+TEST(Counters, CountThePageFaultsOfTheThreadThatHasThem) {
+  constexpr std::size_t pages = 64;
+  const auto size = pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  void* memory = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(memory, MAP_FAILED);
+  ::madvise(memory, size, MADV_NOHUGEPAGE);
+  const ThreadCounters before = thread_counters();
+  std::thread{[&] {
+    const ThreadCounters mine = thread_counters();
+    for (std::size_t i = 0; i < pages; ++i) static_cast<volatile char*>(memory)[i * size / pages] = 1;
+    EXPECT_GE(thread_counters().minor_faults - mine.minor_faults, pages);
+  }}.join();
+  EXPECT_LT(thread_counters().minor_faults - before.minor_faults, pages);
+  ::munmap(memory, size);
 }
 
 TEST(Setup, IsIncompleteWhenSomethingWasRefusedAndSaysWhatAndWhy) {

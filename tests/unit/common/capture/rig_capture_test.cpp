@@ -34,6 +34,37 @@ TEST(RigCapture, SamplesAndEventsComeBackAsTheyWere) {
   EXPECT_EQ(log.messages.at("rig/samples"), 250u);
 }
 
+TEST(RigCapture, KeepsTheLastWordAboutTheMachine) {
+  const example::Folder folder;
+  const auto status = [](const char* machine, std::uint64_t overruns) {
+    wire::Status s{};
+    s.protocol = protocol_version;
+    s.real_time = true;
+    wire::copy_text(s.machine, machine);
+    wire::put_loop({.overruns = overruns, .armed_page_faults = 7}, s);
+    return s;
+  };
+  {
+    RigCaptureWriter file(folder / "capture.mcap");
+    file.write_samples(example::samples(10, 2), 1'000);
+    file.write(status("Linux, core 3", 1), 2'000);
+    file.write(status("Linux, core 3", 2), 3'000);
+    file.close();
+  }
+  const RigLog log = read_capture(folder / "capture.mcap");
+  ASSERT_TRUE(log.machine.has_value());
+  EXPECT_EQ(log.machine->text, "Linux, core 3");
+  EXPECT_TRUE(log.machine->real_time);
+  EXPECT_EQ(log.machine->loop.overruns, 2u);
+  EXPECT_EQ(log.machine->loop.armed_page_faults, 7u);
+  {
+    RigCaptureWriter file(folder / "older.mcap");  // whose writer did not know the field
+    file.write(status("", 0), 2'000);
+    file.close();
+  }
+  EXPECT_FALSE(read_capture(folder / "older.mcap").machine.has_value());
+}
+
 TEST(RigCapture, CountsMissingTicksAndRestarts) {
   TickCounter ticks;
   for (const std::uint64_t tick : {5u, 6u, 7u, 10u, 11u, 20u, 0u, 1u}) ticks.see(tick);

@@ -41,6 +41,21 @@ Sample distinct_sample() {
 }
 
 // Distinct values in every field: an exchanged or forgotten one differs.
+TEST(Convert, LoopCountersComeBackAsTheyWere) {
+  const LoopCounters loop{1, 2, 3, 4, 5, 6, 7};
+  wire::Status status{};
+  wire::put_loop(loop, status);
+  EXPECT_EQ(status.tick, 0u);
+  const LoopCounters back = wire::loop_of(status);
+  EXPECT_EQ(back.overruns, 1u);
+  EXPECT_EQ(back.minor_faults, 2u);
+  EXPECT_EQ(back.major_faults, 3u);
+  EXPECT_EQ(back.preemptions, 4u);
+  EXPECT_EQ(back.allocations, 5u);
+  EXPECT_EQ(back.armed_page_faults, 6u);
+  EXPECT_EQ(back.armed_allocations, 7u);
+}
+
 TEST(Convert, SampleSurvivesTheRoundTripFieldByField) {
   const Sample s = distinct_sample();
   const Sample r = wire::from_wire(wire::to_wire(s));

@@ -68,6 +68,32 @@ TEST_F(ReportTest, PageStandsAloneAndHoldsTheNumbersOfTheRun) {
   EXPECT_EQ(entries(folder_), 2u) << "no temporary may stay";
 }
 
+TEST_F(ReportTest, SaysWhatTheControllersMachineDid) {
+  auto run = made_up::make();
+  run.info.folder = folder_;
+  const Summary s = summarise(run.info, run.samples);
+  write_report(run.info, s, run.samples);
+  EXPECT_EQ(slurp(folder_ / "report.html").find("Controller ran on"), std::string::npos);
+  EXPECT_NE(to_json(run.info, s).find("\"machine\": null"), std::string::npos);
+  run.info.machine = Machine{"Linux <6.1>, core 3",
+                             false,
+                             {.overruns = 11,
+                              .minor_faults = 22,
+                              .major_faults = 33,
+                              .preemptions = 44,
+                              .allocations = 55,
+                              .armed_page_faults = 66,
+                              .armed_allocations = 77}};
+  write_report(run.info, s, run.samples);
+  const std::string page = slurp(folder_ / "report.html");
+  for (const char* text : {"99.99&nbsp;%", "Linux &lt;6.1&gt;, core 3", "only for simulation", "<td>11</td>",
+                           "22 minor, 33 major; 66 while armed", "55; 77 while armed", "44 times"})
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  const std::string json = to_json(run.info, s);
+  for (const char* text : {"\"real_time\": false", "\"overruns\": 11", "\"armed_page_faults\": 66", "\"p99_99\": 1000"})
+    EXPECT_NE(json.find(text), std::string::npos) << text << json;
+}
+
 TEST_F(ReportTest, SecondReportReplacesTheFirst) {
   auto run = made_up::make();
   run.info.folder = folder_;

@@ -97,8 +97,19 @@ TEST(Summary, PercentilesAreNearestRanks) {
   Summary s = summarise(run.info, run.samples);
   EXPECT_EQ(s.tick_us.p50, 500.0);
   EXPECT_EQ(s.tick_us.p99, 990.0);
+  EXPECT_EQ(s.tick_us.p99_99, 1000.0);
   EXPECT_EQ(s.tick_us.max, 1000.0);
   EXPECT_EQ(s.wakeup_late_us.p99, 1980.0);
+  const auto thousand = run.samples;
+  run.samples.clear();
+  for (std::size_t i = 0; i < 10000; ++i) {
+    run.samples.push_back(thousand[i % 1000]);
+    run.samples.back().tick = i + 1;
+  }
+  run.samples[5000].tick_us = 5000.0F;  // one of ten thousand
+  s = summarise(run.info, run.samples);
+  EXPECT_EQ(s.tick_us.p99_99, 1000.0);
+  EXPECT_EQ(s.tick_us.max, 5000.0);
   run.info.lockstep = true;
   s = summarise(run.info, run.samples);
   EXPECT_EQ(s.tick_us.count, 0u);
