@@ -44,7 +44,8 @@ inline constexpr std::size_t least_views = 3;
 // Frames that were mirrored or half turned after they were taken. A chessboard looks the same in a mirror, so no single view shows it: the
 // view then belongs to the mirrored camera. It is told from the rest by the lens (axis off the centre, tangential terms): a view that fits
 // much better after its corners are mirrored or turned back within the frame is left out by that name, the worst first, and the rest is
-// fitted again. When the lens has its axis in the centre it cannot be told, and makes no difference.
+// fitted again. Most frames must be right: when all are turned, or half of them, nothing tells which. When the lens has its axis in the
+// centre it cannot be told, and makes no difference.
 //
 // Throws config::UserError: fewer than three usable views (with what is wrong with the others), views that do not determine the lens.
 [[nodiscard]] Fit calibrate(const std::vector<View>& views, int width_px, int height_px, const Board& board, const FitOptions& options);

@@ -39,15 +39,12 @@ void refuse_twice(const std::vector<std::filesystem::path>& images) {
 struct Views {
   std::vector<View> view{};
   cv::Size size{};
-  std::string seen_board{};  // another one than asked for, when none was found
 };
 
 Views find_views(const CalibrateOptions& options, const std::atomic<bool>& stop) {
   const bool show = isatty(STDERR_FILENO) == 1;
   Views found;
   std::string first;
-  cv::Mat first_grey;
-  bool any = false;
   for (std::size_t k = 0; k < options.images.size(); ++k) {
     if (stop.load()) throw config::UserError("stopped; nothing was written");
     const std::filesystem::path& file = options.images[k];
@@ -57,7 +54,6 @@ Views find_views(const CalibrateOptions& options, const std::atomic<bool>& stop)
       const cv::Mat grey = read_image(file, Colour::Grey);
       if (first.empty()) {
         first = file.string();
-        first_grey = grey;
         found.size = grey.size();
       }
       if (grey.size() != found.size)
@@ -68,11 +64,9 @@ Views find_views(const CalibrateOptions& options, const std::atomic<bool>& stop)
     } catch (const DamagedImage& e) {
       view.corners.problem = e.what();
     }
-    any = any || view.corners.problem.empty();
     found.view.push_back(std::move(view));
   }
   if (show) fmt::print(stderr, "\r\x1b[K");
-  if (!any && !first_grey.empty()) found.seen_board = other_board(first_grey);
   return found;
 }
 
@@ -178,13 +172,7 @@ int run_calibrate(const CalibrateOptions& options, const std::atomic<bool>& stop
     throw config::UserError(fmt::format("{}: camera file and picture cannot be one; give --picture", options.out.string()));
   config::NewFile picture(picture_name);
   const Views views = find_views(options, stop);
-  Fit fit;
-  try {
-    fit = calibrate(views.view, views.size.width, views.size.height, options.board, options.fit);
-  } catch (const config::UserError& e) {
-    if (views.seen_board.empty()) throw;
-    throw config::UserError(fmt::format("{} (the first image shows a board of {}: is --board right?)", e.what(), views.seen_board));
-  }
+  Fit fit = calibrate(views.view, views.size.width, views.size.height, options.board, options.fit);
   fit.camera.calibration->date = now_utc();
   optics::write_camera(file.stream(), fit.camera);
   draw_residuals(picture.stream(), fit);

@@ -94,6 +94,18 @@ bool goes_on(const cv::Mat& grey, const Grid& grid) {
          side(grid.columns, [&](int k, int depth) { return grid.at(k, grid.rows - 1 - depth); });
 }
 
+// Why the board was not found, by the largest grid of corners that another detector of OpenCV sees.
+std::string what_is_there(const cv::Mat& grey, const Board& board) {
+  Points points;
+  cv::Mat grid;
+  const bool any = cv::findChessboardCornersSB(grey, {3, 3}, points, cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE, grid);
+  const auto [less, more] = std::minmax({grid.cols, grid.rows});
+  const auto [fewer, many] = std::minmax({board.columns, board.rows});
+  if (!any || (less == fewer && more == many)) return fmt::format("no board of {} x {} inner corners was found", board.columns, board.rows);
+  return fmt::format("{}: a grid of {} x {} is seen, the board should have {} x {}",
+                     less <= fewer && more <= many ? "too few corners" : "another board", more, less, board.columns, board.rows);
+}
+
 }  // namespace
 
 Corners find_corners(const cv::Mat& grey, const Board& board, const Window& window) {
@@ -106,12 +118,11 @@ Corners find_corners(const cv::Mat& grey, const Board& board, const Window& wind
   }
   const cv::Size size(board.columns, board.rows);
   Points points;
-  if (!cv::findChessboardCorners(grey, size, points,
-                                 cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK)) {
-    if (points.empty() || points.size() >= board.corners())
-      return {.problem = fmt::format("no board of {} x {} inner corners was found", board.columns, board.rows)};
-    return {.problem = fmt::format("too few corners: {} of {} were found", points.size(), board.corners())};
-  }
+  // Equalised, or, where that joins a board with what lies about it, as the camera gave it.
+  const auto find = [&](int flags) {
+    return cv::findChessboardCorners(grey, size, points, flags | cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_FAST_CHECK);
+  };
+  if (!find(cv::CALIB_CB_NORMALIZE_IMAGE) && !find(0)) return {.problem = what_is_there(grey, board)};
   const Grid grid{points, board.columns, board.rows};
   Corners found;
   found.closest_px = std::numeric_limits<double>::infinity();
@@ -128,13 +139,6 @@ Corners find_corners(const cv::Mat& grey, const Board& board, const Window& wind
     refine(grey, points, window.half_px, 0.1);
   for (const cv::Point2f& p : points) found.pixel.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   return found;
-}
-
-std::string other_board(const cv::Mat& grey) {
-  Points points;
-  cv::Mat meta;
-  if (!cv::findChessboardCornersSB(grey, {3, 3}, points, cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE, meta)) return {};
-  return fmt::format("{} x {}", meta.cols, meta.rows);
 }
 
 }  // namespace trocar::camera

@@ -33,7 +33,4 @@ struct Corners {
 // `grey`: 8 bits, one channel. A board half turned about is found as well: numbering from either end fits the same board.
 [[nodiscard]] Corners find_corners(const cv::Mat& grey, const Board& board, const Window& window);
 
-// "10 x 7" when another board is seen in the image, else empty. Slow: for a message.
-[[nodiscard]] std::string other_board(const cv::Mat& grey);
-
 }  // namespace trocar::camera

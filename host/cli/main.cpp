@@ -212,7 +212,7 @@ int main(int argc, char** argv) {
     code = cli::needle_bend(bend);
   });
 
-  // A program of its own: OpenCV would add some 90 ms to the start of every command (host/camera/README.md).
+  // A program of its own: OpenCV would add some 50 ms to the start of every command (host/camera/README.md).
   auto* camera_command = app.add_subcommand(
       "camera",
       "calibrate a camera, undo its distortion\nExample: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
