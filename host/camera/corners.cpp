@@ -106,9 +106,7 @@ std::string what_is_there(const cv::Mat& grey, const Board& board) {
                      less <= fewer && more <= many ? "too few corners" : "another board", more, less, board.columns, board.rows);
 }
 
-}  // namespace
-
-Corners find_corners(const cv::Mat& grey, const Board& board, const Window& window) {
+Corners look_for_corners(const cv::Mat& grey, const Board& board, const Window& window) {
   double darkest = 0.0, lightest = 0.0;
   cv::minMaxLoc(grey, &darkest, &lightest);
   constexpr double least_contrast = 10.0;  // of 255
@@ -139,6 +137,16 @@ Corners find_corners(const cv::Mat& grey, const Board& board, const Window& wind
     refine(grey, points, window.half_px, 0.1);
   for (const cv::Point2f& p : points) found.pixel.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   return found;
+}
+
+}  // namespace
+
+Corners find_corners(const cv::Mat& grey, const Board& board, const Window& window) {
+  try {
+    return look_for_corners(grey, board, window);
+  } catch (const cv::Exception&) {  // it asserts that its windows fit into the image
+    return {.problem = fmt::format("the image of {} x {} px is too small for the board or the window", grey.cols, grey.rows)};
+  }
 }
 
 }  // namespace trocar::camera

@@ -107,6 +107,8 @@ int rectify_images(const RectifyOptions& options, const optics::Camera& camera, 
       throw config::UserError(fmt::format("{}: {} x {} px, but the camera in {} has {} x {} px; name the camera that took it",
                                           file.string(), image.cols, image.rows, options.camera.string(), camera.width_px,
                                           camera.height_px));
+    if (image.depth() != CV_8U && image.depth() != CV_16U)
+      throw config::UserError(fmt::format("{}: its pixels are not whole numbers of 8 or 16 bits; convert it first", file.string()));
     bool written = false;
     std::string why = "is the disk full?";
     try {

@@ -65,6 +65,12 @@ TEST(Corners, NameAnEmptyOrHiddenBoard) {
   const auto problem = [](const cv::Mat& grey) { return find_corners(grey, board_9x6, {}).problem; };
   EXPECT_NE(problem(cv::Mat(480, 640, CV_8U, cv::Scalar(0))).find("the frame is black"), std::string::npos);
   EXPECT_NE(problem(cv::Mat(480, 640, CV_8U, cv::Scalar(200))).find("the frame is empty"), std::string::npos);
+  for (const cv::Size size : {cv::Size(1, 2), cv::Size(7, 7), cv::Size(500, 3), cv::Size(31, 31)}) {
+    cv::Mat small(size, CV_8U, cv::Scalar(0));
+    small.at<unsigned char>(0, 0) = 255;
+    EXPECT_NE(problem(small), "") << size;
+  }
+  EXPECT_NE(find_corners(drawn_board(9, 6), board_9x6, {.half_px = 250}).problem.find("too small"), std::string::npos);
   cv::Mat noise(480, 640, CV_8U);
   cv::theRNG().state = 1;
   cv::randu(noise, 0, 255);
