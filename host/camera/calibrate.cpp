@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 
 #include "common/config/user_error.hpp"
@@ -47,6 +48,18 @@ Points points_of(const View& view) {
   return points;
 }
 
+struct Correspondences {
+  std::vector<std::vector<cv::Point3f>> objects{};
+  std::vector<Points> images{};
+};
+
+Correspondences correspondences(const std::vector<View>& views, const std::vector<std::size_t>& used, const Board& board) {
+  Correspondences c;
+  c.objects.assign(used.size(), board_points(board));
+  for (const std::size_t k : used) c.images.push_back(points_of(views[k]));
+  return c;
+}
+
 int flags_of(const FitOptions& options) {
   int flags = options.fixed_aspect ? cv::CALIB_FIX_ASPECT_RATIO : 0;
   if (!options.tangential) flags |= cv::CALIB_ZERO_TANGENT_DIST;
@@ -66,9 +79,7 @@ constexpr const char* better_views =
 
 Solution solve(const std::vector<View>& views, const std::vector<std::size_t>& used, const cv::Size& size, const Board& board,
                const FitOptions& options) {
-  const std::vector<std::vector<cv::Point3f>> objects(used.size(), board_points(board));
-  std::vector<Points> images;
-  for (const std::size_t k : used) images.push_back(points_of(views[k]));
+  const auto [objects, images] = correspondences(views, used, board);
   const std::size_t corners = used.size() * board.corners();
   const std::size_t parameters = parameters_of(options, used.size());
   if (corners <= parameters)
@@ -78,12 +89,8 @@ Solution solve(const std::vector<View>& views, const std::vector<std::size_t>& u
   s.matrix = cv::Mat::eye(3, 3, CV_64F);
   s.distortion = cv::Mat::zeros(1, 5, CV_64F);
   cv::Mat deviation, pose_deviation, view_rms;
-  try {
-    s.rms_px = cv::calibrateCamera(objects, images, size, s.matrix, s.distortion, s.rotation, s.translation, deviation, pose_deviation,
-                                   view_rms, flags_of(options), {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-12});
-  } catch (const cv::Exception&) {
-    throw config::UserError(fmt::format("{} views do not determine the lens; {}", used.size(), better_views));
-  }
+  s.rms_px = cv::calibrateCamera(objects, images, size, s.matrix, s.distortion, s.rotation, s.translation, deviation, pose_deviation,
+                                 view_rms, flags_of(options), {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-12});
   // OpenCV takes the noise as squared residuals over (corners - parameters); two numbers come from each corner.
   const double per_number = std::sqrt(static_cast<double>(corners - parameters) / static_cast<double>(2 * corners - parameters));
   const auto value = [](const cv::Mat& of, int k) { return of.at<double>(k); };
@@ -109,9 +116,7 @@ Solution solve(const std::vector<View>& views, const std::vector<std::size_t>& u
 // deviations)?
 void require_focal_length(const std::vector<View>& views, const std::vector<std::size_t>& used, const cv::Size& size, const Board& board,
                           const FitOptions& options, const Solution& s) {
-  const std::vector<std::vector<cv::Point3f>> objects(used.size(), board_points(board));
-  std::vector<Points> images;
-  for (const std::size_t k : used) images.push_back(points_of(views[k]));
+  const auto [objects, images] = correspondences(views, used, board);
   cv::Mat matrix = s.matrix.clone(), distortion = s.distortion.clone();
   matrix.at<double>(0, 0) *= 1.1;
   matrix.at<double>(1, 1) *= 1.1;
@@ -161,12 +166,13 @@ struct Suspect {
 Suspect most_turned(const std::vector<View>& views, const std::vector<std::size_t>& used, const cv::Size& size, const Board& board,
                     const Solution& s) {
   const std::vector<cv::Point3f> object = board_points(board);
-  const double median = median_of(s.view_rms_px);
-  const double variance = 0.5 * median * median;  // of a component
+  constexpr double best_px = 0.02;  // no corner is found better; without noise nothing would be left to compare with
+  const double noise_px = std::max(best_px, median_of(s.view_rms_px));
+  const double variance = 0.5 * noise_px * noise_px;  // of a component
   Suspect worst;
   for (std::size_t k = 0; k < used.size(); ++k) {
     const Points image = points_of(views[used[k]]);
-    const double as_is = square_of(object, image, s);
+    const double as_is = static_cast<double>(image.size()) * s.view_rms_px[k] * s.view_rms_px[k];
     for (const Turn& turn : turns) {
       const double evidence = (as_is - square_of(object, turned(image, board, size, turn), s)) / variance;
       if (evidence > worst.evidence) worst = {k, evidence, turn.name};
@@ -206,7 +212,7 @@ double median_rms_px(const optics::Calibration& calibration) {
   return median_of(std::move(rms));
 }
 
-Fit calibrate(const std::vector<View>& views, int width_px, int height_px, const Board& board, const FitOptions& options) {
+Fit calibrate(const std::vector<View>& views, int width_px, int height_px, const Board& board, const FitOptions& options) try {
   const cv::Size size(width_px, height_px);
   std::vector<std::string> left_out(views.size());
   std::vector<std::size_t> used;
@@ -263,6 +269,8 @@ Fit calibrate(const std::vector<View>& views, int width_px, int height_px, const
     }
   }
   return fit;
+} catch (const cv::Exception&) {  // the closed form has no solution
+  throw config::UserError(fmt::format("the views do not determine the lens; {}", better_views));
 }
 
 }  // namespace trocar::camera
