@@ -17,6 +17,7 @@
 #include "host/cli/demo.hpp"
 #include "host/cli/insert_command.hpp"
 #include "host/cli/needle_command.hpp"
+#include "host/cli/process.hpp"
 #include "host/cli/rig_commands.hpp"
 #include "host/cli/scene_commands.hpp"
 #include "host/keys/keys.hpp"
@@ -211,6 +212,14 @@ int main(int argc, char** argv) {
     bend.needle = config::find_share("needles", bend.needle.string());
     code = cli::needle_bend(bend);
   });
+
+  // A program of its own: OpenCV would add some 50 ms to the start of every command (host/camera/README.md).
+  auto* camera_command = app.add_subcommand(
+      "camera",
+      "calibrate a camera, undo its distortion\nExample: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
+  camera_command->prefix_command();
+  camera_command->set_help_flag();
+  camera_command->callback([&] { cli::become_program("trocar-camera", camera_command->remaining()); });
 
   auto* keys_command = app.add_subcommand(
       "keys",

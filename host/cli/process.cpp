@@ -19,17 +19,35 @@ namespace trocar::cli {
 
 namespace {
 double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Pointers into both; exec and spawn do not write there.
+std::vector<char*> argv_of(const std::string& path, const std::vector<std::string>& arguments) {
+  std::vector<char*> argv{const_cast<char*>(path.c_str())};
+  for (const auto& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+  argv.push_back(nullptr);
+  return argv;
+}
+
+config::UserError not_started(const std::string& path, int error) {
+  return config::UserError(fmt::format("cannot start {} ({}): build it with ./run build", path, std::strerror(error)));
+}
+
 }  // namespace
 
 std::filesystem::path program_folder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }
+
+void become_program(const std::string& name, const std::vector<std::string>& arguments) {
+  const std::string path = (program_folder() / name).string();
+  std::vector<char*> argv = argv_of(path, arguments);
+  ::execv(path.c_str(), argv.data());
+  throw not_started(path, errno);
+}
 
 Process::Process(const std::string& name, const std::vector<std::string>& arguments) : name_(name) {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) throw config::UserError(fmt::format("cannot start {}: {}", name, std::strerror(errno)));
   const std::string path = (program_folder() / name).string();
-  std::vector<char*> argv{const_cast<char*>(path.c_str())};
-  for (const auto& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-  argv.push_back(nullptr);
+  std::vector<char*> argv = argv_of(path, arguments);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
@@ -46,7 +64,7 @@ Process::Process(const std::string& name, const std::vector<std::string>& argume
   pipe_ = ends[0];
   if (error != 0) {
     close(pipe_);
-    throw config::UserError(fmt::format("cannot start {} ({}): build it with ./run build", path, std::strerror(error)));
+    throw not_started(path, error);
   }
 }
 

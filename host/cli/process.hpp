@@ -12,6 +12,10 @@ namespace trocar::cli {
 // The folder of the running program; the other programs are in it too.
 [[nodiscard]] std::filesystem::path program_folder();
 
+// This process goes on as another of our programs, with its stdin, stdout, stderr and exit code. Throws config::UserError when it is not
+// there.
+[[noreturn]] void become_program(const std::string& name, const std::vector<std::string>& arguments);
+
 class Process {
  public:
   // Starts NAME from program_folder(). Its stdout and stderr come here. Throws config::UserError when it cannot start.

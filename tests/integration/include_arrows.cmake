@@ -5,13 +5,14 @@ cmake_minimum_required(VERSION 3.25)
 
 set(rules
   "^common/ -> ^(hal|firmware|sim_plant|host)/"
-  "^common/(core|mechanism|rig|element|model|contact|needle|insertion)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
+  "^common/(core|mechanism|rig|element|model|contact|needle|insertion)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment|optics)/"
   "^common/core$ -> ^common/(mechanism|rig)/"
   "^common/model$ -> ^common/(contact|insertion)/"
   "^common/image_file$ -> ^common/(fem|scene|condense)/"
-  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/condense|common/image_file|common/experiment)/"
+  "^common/optics$ -> ^common/(fem|scene|condense|wire|capture)/"
+  "^hal(/|$) -> ^(firmware|sim_plant|host|common/config|common/wire|common/capture|common/fem|common/scene|common/condense|common/image_file|common/experiment|common/optics)/"
   "^firmware/ -> ^(sim_plant|host)/"
-  "^firmware/(control|safety|virtual_needle|controller)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment)/"
+  "^firmware/(control|safety|virtual_needle|controller)$ -> ^common/(config|wire|capture|fem|scene|condense|image_file|experiment|optics)/"
   "^sim_plant/ -> ^host/"
   "^sim_plant/(mechanism|nodes|phantom|plant)$ -> ^firmware/"
   "^host/ -> ^(hal|firmware|sim_plant)/")

@@ -1,5 +1,6 @@
-# The firmware loads no library that is under the GPL (CHOLMOD's supernodal module, gmsh) nor the BLAS, directly or through another.
-# Needs RIG and HOST (programs). Positive control: the host's program does load CHOLMOD, so this looks in the right place.
+# The firmware loads no library that is under the GPL (CHOLMOD's supernodal module, gmsh) nor the BLAS, directly or through another. OpenCV,
+# with the hundred libraries that come with it, is loaded by trocar-camera alone.
+# Needs RIG, HOST, PLANT and CAMERA (programs). Positive controls: the host's program does load CHOLMOD and the camera's OpenCV.
 cmake_minimum_required(VERSION 3.25)
 function(libraries program)
   execute_process(COMMAND ldd ${program} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
@@ -21,3 +22,14 @@ endif()
 if(NOT output MATCHES "libc[.]")
   message(FATAL_ERROR "ldd found nothing in ${RIG}:\n${output}")
 endif()
+
+libraries(${CAMERA})
+if(NOT output MATCHES "libopencv_")
+  message(FATAL_ERROR "${CAMERA} does not load OpenCV, so this test proves nothing:\n${output}")
+endif()
+foreach(program IN ITEMS ${RIG} ${HOST} ${PLANT})
+  libraries(${program})
+  if(output MATCHES "libopencv_")
+    message(FATAL_ERROR "${program} loads OpenCV:\n${output}")
+  endif()
+endforeach()

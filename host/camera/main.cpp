@@ -1,0 +1,102 @@
+// trocar-camera: the commands of `trocar camera`, which starts it. A program of its own because of what OpenCV loads (README.md).
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <atomic>
+#include <csignal>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "common/config/share.hpp"
+#include "host/camera/calibrate_command.hpp"
+#include "host/camera/rectify_command.hpp"
+
+namespace {
+
+using namespace trocar;
+
+std::atomic<bool> stop_asked{false};
+void on_signal(int) { stop_asked.store(true); }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // What OpenCV has to say comes as an exception, or as a status; its own lines would break ours.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  CLI::App app{
+      "cameras: calibrate one, and undo its distortion\nExample: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out "
+      "camera.toml",
+      "trocar camera"};
+  app.require_subcommand(1);
+  int code = 0;
+
+  camera::CalibrateOptions calibrate;
+  auto* c = app.add_subcommand("calibrate",
+                               "lens, distortion and poses from images of a chessboard\n"
+                               "Example: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
+  c->add_option("images", calibrate.images, "images of the board, all of one size")->required();
+  c->add_option("--board", "inner corners, those between four squares, as COLUMNSxROWS")->required()->each([&](const std::string& text) {
+    if (const std::string wrong = camera::parse_board(text, calibrate.board); !wrong.empty()) throw CLI::ValidationError("--board", wrong);
+  });
+  c->add_option("--square-m", calibrate.board.square_m, "side of a square, m")->required()->check(CLI::Range(1e-5, 10.0));
+  c->add_option("--out", calibrate.out, "camera file (TOML), written anew")->required();
+  c->add_option("--picture", calibrate.picture, "residuals as SVG (default: the camera file's name and .svg)");
+  c->add_flag("--fixed-aspect", calibrate.fit.fixed_aspect, "pixels are square: fx = fy");
+  c->add_option("--radial", calibrate.fit.radial_terms, "radial terms, k1 to k3")->check(CLI::Range(0, 3))->capture_default_str();
+  c->add_flag_callback(
+      "--no-tangential", [&] { calibrate.fit.tangential = false; }, "without p1, p2");
+  c->add_flag("--without-outliers", calibrate.fit.without_outliers,
+              fmt::format("leave out views whose RMS is above {:g} times the median of the views; otherwise they are named and kept",
+                          camera::outlier_factor));
+  std::string window = "11";
+  c->add_option(
+       "--window", window,
+       "half side of the square in which a corner is refined, px, or \"spacing\": three tenths of the way to its nearest neighbour; "
+       "better where squares are small or oblique")
+      ->capture_default_str()
+      ->each([&](const std::string& text) {
+        calibrate.window.by_spacing = text == "spacing";
+        if (calibrate.window.by_spacing) return;
+        if (text.find_first_not_of("0123456789") != std::string::npos || text.size() > 2 || text.empty() || std::stoi(text) < 2)
+          throw CLI::ValidationError("--window", text + ": write 2 to 99, or spacing");
+        calibrate.window.half_px = std::stoi(text);
+      });
+  c->add_flag("--json", calibrate.json, "the result as JSON on stdout");
+  c->callback([&] { code = camera::run_calibrate(calibrate, stop_asked); });
+
+  camera::RectifyOptions rectify;
+  auto* r = app.add_subcommand("rectify",
+                               "images or points without the lens's distortion\n"
+                               "Example: trocar camera rectify left*.jpg --camera camera.toml --out rectified\n"
+                               "Points: trocar camera rectify --points in.csv --camera camera.toml --out out.csv\n"
+                               "in.csv: u_px,v_px; out.csv: u_px,v_px,iterations,status; the first pixel's centre is 0,0");
+  auto* images = r->add_option("images", rectify.images, "images of that camera");
+  auto* points = r->add_option("--points", rectify.points, "CSV u_px,v_px instead of images")->excludes(images);
+  std::string camera_name;
+  r->add_option("--camera", camera_name, "camera name, or path of its TOML file")->required();
+  r->add_option("--out", rectify.out, "a folder to make, or with --points a CSV")->required();
+  std::string method = "newton";
+  r->add_option("--method", method, "inverse of the distortion, for points; both to 1e-8 px")
+      ->check(CLI::IsMember({"newton", "fixed-point"}))
+      ->capture_default_str()
+      ->needs(points);
+  r->add_flag("--distort", rectify.distort, "points the other way: from the rectified image to the camera's")->needs(points);
+  r->add_flag("--json", rectify.json, "the summary as JSON on stdout");
+  r->callback([&] {
+    if (rectify.images.empty() && rectify.points.empty()) throw CLI::RequiredError("images or --points");
+    rectify.fixed_point = method == "fixed-point";
+    rectify.camera = config::find_share("cameras", camera_name);
+    code = camera::run_rectify(rectify, stop_asked);
+  });
+
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+  try {
+    app.parse(argc, argv);
+    return code;
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "trocar: {}\n", e.what());
+    return 1;
+  }
+}
