@@ -30,7 +30,7 @@ struct Listening {
     rig.dds_domain = 100U + static_cast<std::uint32_t>(getpid()) % 101U;
     participant.emplace(rig.dds_domain);
     reader.emplace(*participant);
-    bridge.emplace(rig, *mail, *shared);
+    bridge.emplace(rig, *mail, *shared, std::filesystem::temp_directory_path() / "flight");  // nothing is recorded here
   }
 
   // Of a rig that is homed and at rest.
