@@ -25,7 +25,6 @@ constexpr double velocity_bandwidth_rad_s = 300.0;            // one count of 40
 constexpr double load_bandwidth_rad_s = 60.0;
 constexpr double longest_step_s = 0.005;           // after a stall the reference goes on slowly instead of jumping
 constexpr double jump_factor = 4.0;                // motion per tick beyond this many times the velocity fault is no motion
-constexpr std::uint32_t most_unsolved_ticks = 20;  // of the virtual needle in a row, then its wrench is too old to be felt
 constexpr double friction_smoothing_rad_s = 0.01;  // joint speed at which the fed-forward Coulomb friction is at 76 %
 
 }  // namespace
@@ -212,7 +211,8 @@ void Controller::supervise(const TickInput& input) noexcept {
   check(force > l.fault_force_n, Fault::ForceLimit, force, l.fault_force_n);
   check(std::abs(base_wrench_[2]) > l.fault_moment_nm, Fault::ForceLimit, base_wrench_[2], l.fault_moment_nm);
   if (mode_ == Mode::Haptic) {
-    check(needle_->unsolved_ticks() > most_unsolved_ticks, Fault::SolverNotConverged, needle_->unsolved_ticks(), most_unsolved_ticks);
+    check(needle_->unsolved_ticks() > safety::most_unsolved_ticks, Fault::SolverNotConverged, needle_->unsolved_ticks(),
+          safety::most_unsolved_ticks);
     check(control::failed(haptic_config_.guard, haptic_.guard), Fault::NotPassive, haptic_.guard.energy_j, -haptic_config_.guard.bound_j);
   }
   if (position_controlled()) {

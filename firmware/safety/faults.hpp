@@ -58,6 +58,9 @@ inline constexpr std::array<FaultRow, fault_count> fault_table{{
 
 [[nodiscard]] constexpr const FaultRow& row(Fault fault) noexcept { return fault_table[static_cast<std::size_t>(fault)]; }
 
+// Of the virtual needle in a row: then its wrench is too old to be felt.
+inline constexpr std::uint32_t most_unsolved_ticks = 20;
+
 // How long a cause may last before it is a fault, in ticks; 0 for what is one at once, and for limits of motion, which are reached when
 // they are.
 [[nodiscard]] constexpr std::uint32_t patience_ticks(Fault fault, const rig::Rig& rig) noexcept {
@@ -70,6 +73,8 @@ inline constexpr std::array<FaultRow, fault_count> fault_table{{
       return rig.timing.missed_sensor_ticks;
     case Fault::TorqueMismatch:
       return rig.limits.torque_error_ticks;
+    case Fault::SolverNotConverged:
+      return most_unsolved_ticks;
     default:
       return 0;
   }
