@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
                                "Example: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
   c->add_option("images", calibrate.images, "images of the board, all of one size")->required();
   c->add_option("--board", "inner corners, those between four squares, as COLUMNSxROWS")->required()->each([&](const std::string& text) {
-    if (const std::string wrong = camera::parse_board(text, calibrate.board); !wrong.empty()) throw CLI::ValidationError("--board", wrong);
+    if (const std::string wrong = camera::parse_board(text, calibrate.board); !wrong.empty()) throw CLI::ValidationError(wrong);
   });
   c->add_option("--square-m", calibrate.board.square_m, "side of a square, m")->required()->check(CLI::Range(1e-5, 10.0));
   c->add_option("--out", calibrate.out, "camera file (TOML), written anew")->required();

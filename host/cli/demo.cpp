@@ -306,6 +306,7 @@ int run_demo(const DemoOptions& options, std::atomic<bool>& stop) {
     if (!std::filesystem::exists(out / "capture.mcap")) {
       std::filesystem::remove(out / "model.image", ignored);
       std::filesystem::remove(out, ignored);
+      if (options.out.empty()) std::filesystem::remove(out.parent_path(), ignored);  // runs/, unless it holds others
     }
     throw;
   }
