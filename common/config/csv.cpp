@@ -58,7 +58,7 @@ std::string header_problem(std::string_view line, std::initializer_list<std::str
 
 }  // namespace
 
-Csv Csv::load(const std::filesystem::path& file, std::initializer_list<std::string_view> headers) {
+Csv Csv::load(const std::filesystem::path& file, std::initializer_list<std::string_view> headers, NotANumber nan) {
   Csv csv;
   csv.file_ = file.string();
   const auto refuse = [&csv](const std::string& problem) { throw UserError(fmt::format("{}: {}", csv.file_, problem)); };
@@ -103,7 +103,8 @@ Csv Csv::load(const std::filesystem::path& file, std::initializer_list<std::stri
         refuse_line(fmt::format("{} = {}: too large or too small for a number", names[i], shown(fields[i])));
       if (code != std::errc() || end != digits.data() + digits.size())
         refuse_line(fmt::format("{} = \"{}\": not a number; write one such as 0.05 or -1.5e-3", names[i], shown(fields[i])));
-      if (!std::isfinite(value)) refuse_line(fmt::format("{} = {}: must be a finite number", names[i], shown(fields[i])));
+      if (!std::isfinite(value) && !(std::isnan(value) && nan == NotANumber::Allowed))
+        refuse_line(fmt::format("{} = {}: must be a finite number", names[i], shown(fields[i])));
       csv.value_.push_back(value);
     }
     csv.line_.push_back(number);

@@ -14,12 +14,14 @@
 
 namespace trocar::config {
 
+enum class NotANumber { Refused, Allowed };  // "nan", where a table says so of what is missing
+
 class Csv {
  public:
   // `headers`: the header lines that the caller can use, such as {"x_m,y_m,fx_n,fy_n"}; names and order must be those of one of them.
   // Throws UserError: a file that cannot be read, another header, a row with fewer or more fields, a field that is no finite number, no
   // rows.
-  static Csv load(const std::filesystem::path& file, std::initializer_list<std::string_view> headers);
+  static Csv load(const std::filesystem::path& file, std::initializer_list<std::string_view> headers, NotANumber nan = NotANumber::Refused);
 
   [[nodiscard]] std::size_t header() const { return header_; }  // index of the header that the file has
   [[nodiscard]] std::size_t columns() const { return columns_; }

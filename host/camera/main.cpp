@@ -9,6 +9,7 @@
 #include "common/config/share.hpp"
 #include "host/camera/calibrate_command.hpp"
 #include "host/camera/rectify_command.hpp"
+#include "host/camera/register_command.hpp"
 
 namespace {
 
@@ -86,6 +87,32 @@ int main(int argc, char** argv) {
     rectify.fixed_point = method == "fixed-point";
     rectify.camera = config::find_share("cameras", camera_name);
     code = camera::run_rectify(rectify, stop_asked);
+  });
+
+  camera::RegisterOptions registration;
+  auto* g = app.add_subcommand("register",
+                               "where the camera stands over the rig, from marks on the tool while the rig moves\n"
+                               "Example: trocar camera register --marks marks.csv --capture capture.mcap --camera camera.toml --out "
+                               "registration.toml\n"
+                               "marks.csv: from trocar track, or t_s,u_px,v_px of one mark, on the rig's clock");
+  g->add_option("--marks", registration.marks, "where the marks were seen, CSV")->required();
+  g->add_option("--capture", registration.capture, "the rig's recording of the same motion, MCAP")->required();
+  std::string registered_camera;
+  g->add_option("--camera", registered_camera, "camera name, or path of its TOML file")->required();
+  g->add_option("--out", registration.out, "registration (TOML), written anew")->required();
+  g->add_option("--mark-m", registration.mark_m,
+                "x and y of each mark in the tool, x along the needle; without it they are found, and the tool has to turn")
+      ->delimiter(',');
+  g->add_option("--delay-s", registration.delay_s, "frames' times plus this are the rig's: where the search for it begins")
+      ->check(CLI::Range(-1e9, 1e9));
+  g->add_flag("--known-delay", registration.known_delay, "take --delay-s as it is (0 without it)");
+  g->add_option(
+      "--phantom", registration.phantom,
+      "TOML with rotation_rad and translation_m of the phantom's plane in the camera's frame: adds where the phantom lies in the rig");
+  g->add_flag("--json", registration.json, "the result as JSON on stdout");
+  g->callback([&] {
+    registration.camera = config::find_share("cameras", registered_camera);
+    code = camera::run_register(registration);
   });
 
   std::signal(SIGINT, on_signal);

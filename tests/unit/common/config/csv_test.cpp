@@ -1,5 +1,7 @@
 #include "common/config/csv.hpp"
 
+#include <cmath>
+
 #include "file_fixture.hpp"
 
 namespace trocar::config {
@@ -34,6 +36,14 @@ TEST_F(CsvTest, TakesWhatSpreadsheetsWrite) {
   EXPECT_EQ(csv(0, 2), 3.0);
   expect_parts(csv.where(0), {"file.toml:3"});
   EXPECT_EQ(read("x_m,y_m,fx_n\n0.1,0.2,12345.678901234567\n")(0, 2), 12345.678901234567);
+}
+
+TEST_F(CsvTest, TakesWhatIsMissingWhereItMayBe) {
+  refused("x_m,y_m,fx_n\n0.1,nan,4\n", {"file.toml:2: y_m = nan: must be a finite number"});
+  const Csv csv = Csv::load(write("x_m\n1\nnan\n"), {"x_m"}, NotANumber::Allowed);
+  EXPECT_EQ(csv(0, 0), 1.0);
+  EXPECT_TRUE(std::isnan(csv(1, 0)));
+  expect_parts(error_from([&] { static_cast<void>(Csv::load(write("x_m\ninf\n"), {"x_m"}, NotANumber::Allowed)); }), {"x_m = inf"});
 }
 
 TEST_F(CsvTest, RefusesOtherHeaders) {
