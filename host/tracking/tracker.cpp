@@ -33,6 +33,12 @@ std::size_t Tracker::valid() const noexcept {
   return static_cast<std::size_t>(std::ranges::count_if(marker_, [](const Marker& m) { return m.valid; }));
 }
 
+std::vector<Place> Tracker::rest() const {
+  std::vector<Place> out;
+  for (const Track& t : track_) out.push_back(t.known ? t.rest : Place{nan(), nan()});
+  return out;
+}
+
 std::string Tracker::start(const optics::Frame& frame) {
   gains_ = white_balance(frame);
   DetectedGrid grid = detect_grid(frame, gains_, options_.grid);
@@ -96,7 +102,21 @@ void Tracker::update(const optics::Frame& frame) {
   search(frame, which, from);
   judge();
   recover(frame);
+  if (std::ranges::count_if(located_, &Located::found) < std::min<std::ptrdiff_t>(3, static_cast<std::ptrdiff_t>(located_.size())))
+    find_anew(frame);
   keep(frame.number);
+}
+
+// All are lost (darkness, a hand before the lens): nothing says where to look but the whole image. Only the whole grid tells who is who.
+void Tracker::find_anew(const optics::Frame& frame) {
+  DetectedGrid grid = detect_grid(frame, gains_, options_.grid);
+  if (!grid.problem.empty()) return;
+  fill_missing(grid.place, options_.grid);
+  std::vector<std::size_t> all(track_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  search(frame, all, grid.place);
+  judge();
+  recover(frame);
 }
 
 Located Tracker::locate(const optics::Frame& frame, const Place& start, double radius_px, Scratch& scratch) const {

@@ -5,7 +5,7 @@
 //   dot,
 //              is not believed: nothing is ever reported that was not seen, and no two markers change places
 //   recover    what is lost is sought where its neighbours say that it is, in every frame
-// After start() nothing of the size of the image is touched.
+// After start() nothing of the size of the image is touched, unless all markers are lost: then the grid is sought anew.
 #pragma once
 
 #include <cstdint>
@@ -47,6 +47,7 @@ class Tracker {
 
   [[nodiscard]] std::span<const Marker> markers() const noexcept { return marker_; }
   [[nodiscard]] std::size_t valid() const noexcept;
+  [[nodiscard]] std::vector<Place> rest() const;  // of the first frame, or where each was first seen; NaN for one never seen
   [[nodiscard]] double radius_px() const noexcept { return radius_px_; }
   [[nodiscard]] const TrackerOptions& options() const noexcept { return options_; }
 
@@ -64,6 +65,7 @@ class Tracker {
   [[nodiscard]] std::optional<Place> expected(std::size_t k) const;
   void judge();
   void recover(const optics::Frame& frame);
+  void find_anew(const optics::Frame& frame);
   void keep(std::uint64_t number);
 
   TrackerOptions options_;
