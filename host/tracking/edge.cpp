@@ -222,7 +222,9 @@ Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Pla
   out.v_px = centre.v_px;
   out.radius_px = radius;
   out.score = std::min(1.0, circle.agreeing);
-  out.covariance = circle.covariance;
+  // Rays less than two pixels apart at the edge share their samples' noise.
+  const double shared = std::max(1.0, rays * 2.0 / (2.0 * std::numbers::pi * std::max(radius, 1.0)));
+  for (std::size_t k = 0; k < 3; ++k) out.covariance[k] = shared * circle.covariance[k];
   out.found = out.score >= least_rays && radius > 0.6 * radius_px && radius < 1.6 * radius_px && std::isfinite(radius);
   return out;
 }
