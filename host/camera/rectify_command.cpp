@@ -17,43 +17,12 @@
 #include "common/config/user_error.hpp"
 #include "common/optics/camera_file.hpp"
 #include "host/camera/image.hpp"
+#include "host/camera/new_folder.hpp"
 
 namespace trocar::camera {
 namespace {
 
 constexpr const char* stopped = "stopped; nothing was written";
-
-// A folder that appears with all its files, or not at all.
-class NewFolder {
- public:
-  explicit NewFolder(std::filesystem::path folder) : folder_(std::move(folder)) {
-    if (folder_.filename().empty()) folder_ = folder_.parent_path();  // a name that ends in '/'
-    std::error_code error;
-    if (std::filesystem::exists(std::filesystem::symlink_status(folder_, error)))
-      throw config::UserError(fmt::format("{}: is there already; name a new folder", folder_.string()));
-    part_ = folder_.parent_path() / fmt::format(".{}.{}.part", folder_.filename().string(), ::getpid());
-    if (!std::filesystem::create_directory(part_, error))
-      throw config::UserError(
-          fmt::format("{}: cannot be made: {}; choose a place that exists and is yours", folder_.string(), error.message()));
-  }
-  ~NewFolder() {
-    std::error_code ignored;
-    if (!part_.empty()) std::filesystem::remove_all(part_, ignored);
-  }
-  NewFolder(const NewFolder&) = delete;
-  NewFolder& operator=(const NewFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& part() const { return part_; }
-  void keep() {
-    std::error_code error;
-    std::filesystem::rename(part_, folder_, error);
-    if (error) throw config::UserError(fmt::format("{}: cannot be made: {}", folder_.string(), error.message()));
-    part_.clear();
-  }
-
- private:
-  std::filesystem::path folder_{}, part_{};
-};
 
 // For each rectified pixel the place in the camera's image. Outside of it where the lens shows nothing.
 struct Map {

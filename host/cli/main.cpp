@@ -214,12 +214,23 @@ int main(int argc, char** argv) {
   });
 
   // A program of its own: OpenCV would add some 50 ms to the start of every command (host/camera/README.md).
-  auto* camera_command = app.add_subcommand(
-      "camera",
-      "calibrate a camera, undo its distortion\nExample: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
+  auto* camera_command = app.add_subcommand("camera",
+                                            "list, grab from, calibrate, rectify, register and simulate cameras\nExample: trocar camera "
+                                            "calibrate left*.jpg --board 9x6 --square-m 0.025 --out camera.toml");
   camera_command->prefix_command();
   camera_command->set_help_flag();
   camera_command->callback([&] { cli::become_program("trocar-camera", camera_command->remaining()); });
+
+  auto* track_command = app.add_subcommand(
+      "track",
+      "follow the markers of a phantom in a camera's frames\nExample: trocar track frames/ --camera camera.toml --out markers.csv");
+  track_command->prefix_command();
+  track_command->set_help_flag();
+  track_command->callback([&] {
+    std::vector<std::string> words = track_command->remaining();
+    words.insert(words.begin(), "track");
+    cli::become_program("trocar-camera", words);
+  });
 
   auto* keys_command = app.add_subcommand(
       "keys",

@@ -37,6 +37,12 @@ std::size_t Tracker::valid() const noexcept {
   return static_cast<std::size_t>(std::ranges::count_if(marker_, [](const Marker& m) { return m.valid; }));
 }
 
+std::vector<Place> Tracker::rest() const {
+  std::vector<Place> out;
+  for (const Track& t : track_) out.push_back(t.known ? t.rest : Place{nan(), nan()});
+  return out;
+}
+
 std::string Tracker::start(const optics::Frame& frame) {
   gains_ = white_balance(frame);
   DetectedGrid grid = detect_grid(frame, gains_, options_.grid);

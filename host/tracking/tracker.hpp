@@ -1,12 +1,12 @@
 // Follows the markers of a phantom from frame to frame.
 //   predict    where a marker was, plus its last velocity
 //   find       by one of the two methods of locate.hpp, within its window only
-//   judge      a marker that strays from the mean displacement of its neighbours by more than part of a step, or that sits on
-//              another's dot, is not believed: nothing is ever reported that was not seen, and no two markers change places
-//   recover    what is lost is sought where its neighbours say that it is, in every frame; when most are lost, where each was last, and
-//   then
-//              by finding the grid anew (not when the places were given). So after a gap of more than `longest_coast` frames, in which
-//              markers may have gone half a step: counted from the grid's border, none becomes another
+//   judge      a marker that strays from the mean displacement of its neighbours by more than part of a step, or that
+//              sits on another's dot, is not believed: nothing is reported that was not seen, no two change places
+//   recover    what is lost is sought where its neighbours say that it is, in every frame. When most are lost, where
+//              each was last; then, unless the places were given to start(), in the grid found anew, as after a gap of
+//              more than `longest_coast` frames, in which a marker may have gone half a step: counted from the grid's
+//              border, none becomes another
 // But for that, nothing of the size of the image is touched after start().
 #pragma once
 
@@ -49,6 +49,7 @@ class Tracker {
 
   [[nodiscard]] std::span<const Marker> markers() const noexcept { return marker_; }
   [[nodiscard]] std::size_t valid() const noexcept;
+  [[nodiscard]] std::vector<Place> rest() const;  // of the first frame, or where each was first seen; NaN for one never seen
   [[nodiscard]] double radius_px() const noexcept { return radius_px_; }
   [[nodiscard]] const TrackerOptions& options() const noexcept { return options_; }
 
