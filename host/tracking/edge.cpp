@@ -236,7 +236,7 @@ Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Pla
   if (!there) return out;
 
   double radius = std::clamp(std::sqrt(blob.area_px / std::numbers::pi), 0.7 * radius_px, 1.4 * radius_px);
-  const double least_reach = std::min(4.0, 0.45 * radius_px);
+  const double least_reach = std::min(4.0, 0.65 * radius_px);
   double reach = std::max(least_reach, 0.45 * radius_px);
   Outline outline;
   for (int k = 0; k < passes; ++k) {

@@ -97,7 +97,6 @@ std::string Tracker::start(const optics::Frame& frame, std::vector<Place> places
 
 std::span<const Marker> Tracker::update(const optics::Frame& frame) {
   const std::uint64_t elapsed = frame.number > number_ ? frame.number - number_ : 1;
-  number_ = frame.number;
   std::ranges::fill(located_, Located{});
   if (elapsed > longest_coast) seek_in_new_grid(frame);
   if (2 * found() < located_.size()) {
@@ -112,8 +111,9 @@ std::span<const Marker> Tracker::update(const optics::Frame& frame) {
     search(frame);
     judge();
     recover(frame);
-    if (2 * found() < located_.size()) find_again(frame);
+    if (2 * found() < located_.size()) find_again(frame, elapsed <= longest_coast);
   }
+  if (2 * found() >= located_.size()) number_ = frame.number;
   keep(frame.number);
   return marker_;
 }
@@ -123,7 +123,7 @@ std::size_t Tracker::found() const noexcept {
 }
 
 // Most markers are lost, so that neighbours say little.
-void Tracker::find_again(const optics::Frame& frame) {
+void Tracker::find_again(const optics::Frame& frame, bool grid_too) {
   sought_.clear();
   for (std::size_t k = 0; k < track_.size(); ++k) {
     if (located_[k].found || !track_[k].known) continue;
@@ -133,7 +133,7 @@ void Tracker::find_again(const optics::Frame& frame) {
   search(frame);
   judge();
   recover(frame);
-  if (2 * found() < located_.size()) seek_in_new_grid(frame);
+  if (grid_too && 2 * found() < located_.size()) seek_in_new_grid(frame);
 }
 
 void Tracker::seek_in_new_grid(const optics::Frame& frame) {

@@ -4,9 +4,9 @@
 //   judge      a marker that strays from the mean displacement of its neighbours by more than part of a step, or that
 //              sits on another's dot, is not believed: nothing is reported that was not seen, no two change places
 //   recover    what is lost is sought where its neighbours say that it is, in every frame. When most are lost, where
-//              each was last; then, unless the places were given to start(), in the grid found anew, as after a gap of
-//              more than `longest_coast` frames, in which a marker may have gone half a step: counted from the grid's
-//              border, none becomes another
+//              each was last; then in the grid found anew. After more than `longest_coast` frames in which most were not
+//              seen a marker may have gone half a step: then the grid comes first, since counted from its border none
+//              becomes another. (Not when the places were given to start().)
 // But for that, nothing of the size of the image is touched after start().
 #pragma once
 
@@ -64,7 +64,7 @@ class Tracker {
   };
   [[nodiscard]] Located locate(const optics::Frame& frame, const Place& start, double radius_px, Scratch& scratch) const;
   void search(const optics::Frame& frame);
-  void find_again(const optics::Frame& frame);
+  void find_again(const optics::Frame& frame, bool grid_too);
   void seek_in_new_grid(const optics::Frame& frame);
   [[nodiscard]] std::optional<Place> expected(std::size_t k) const;
   [[nodiscard]] std::size_t found() const noexcept;
@@ -84,7 +84,7 @@ class Tracker {
   bool detected_{};
   std::optional<Disc> disc_{};
   double radius_px_{}, step_px_{};
-  std::uint64_t number_{};
+  std::uint64_t number_{};  // of the last frame in which most were seen
 };
 
 }  // namespace trocar::tracking
