@@ -74,7 +74,8 @@ Source::Status FilesSource::next(optics::Frame& frame, std::chrono::milliseconds
 VideoSource::VideoSource(std::filesystem::path file, const SourceOptions& options) : file_(std::move(file)) {
   if (!std::filesystem::is_regular_file(file_))
     throw config::UserError(fmt::format("{}: there is no such file; check the path", file_.string()));
-  if (!video_.open(file_.string()))
+  // Not by whichever back end comes first: one takes a lone image for a video.
+  if (!video_.open(file_.string(), cv::CAP_FFMPEG) && !video_.open(file_.string(), cv::CAP_OPENCV_MJPEG))
     throw config::UserError(fmt::format("{}: no video that can be decoded here; convert it, to MJPEG in AVI for one", file_.string()));
   const double own = video_.get(cv::CAP_PROP_FPS);
   rate_hz_ = std::isfinite(own) && own > 0.0 ? own : options.rate_hz;

@@ -195,7 +195,7 @@ bool fit_outline(Scratch& s, double radius, const std::array<double, 2>& oval, d
     if (factor.info() != Eigen::Success) return false;
     x = factor.solve(right);
     const Matrix5 inverse = factor.solve(Matrix5::Identity());
-    const double variance = squares / std::max(1.0, n - 5.0);
+    const double variance = squares / (tukey_variance * std::max(1.0, n - 5.0));
     out.deviation_px = scale * std::sqrt(inverse(1, 1) + inverse(2, 2));
     out.covariance = {variance * inverse(1, 1), variance * inverse(1, 2), variance * inverse(2, 2)};
   }
@@ -253,7 +253,9 @@ Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Pla
   out.v_px = centre.v_px;
   out.radius_px = radius;
   out.score = std::min(1.0, outline.agreeing);
-  out.covariance = outline.covariance;
+  // Rays less than two pixels apart at the edge share their samples' noise.
+  const double shared = std::max(1.0, rays * 2.0 / (2.0 * std::numbers::pi * std::max(radius, 1.0)));
+  for (std::size_t k = 0; k < 3; ++k) out.covariance[k] = shared * outline.covariance[k];
   if (outline.deviation_px > most_deviation_px) return out;  // the rays left are all on one side
   out.found = out.score >= least_rays && radius > 0.6 * radius_px && radius < 1.6 * radius_px && std::isfinite(radius);
   return out;

@@ -12,8 +12,10 @@
 namespace trocar::tracking {
 namespace {
 
-constexpr double stray_part = 0.35;         // of a step of the grid: as far as a marker may stray from what its neighbours say
-constexpr double together_part = 0.5;       // of a step: two markers closer than this are on one dot
+constexpr double stray_part = 0.35;    // of a step of the grid: as far as a marker may stray from what its neighbours say
+constexpr double together_part = 0.5;  // of a step: two markers closer than this are on one dot
+constexpr double size_part = 0.2;  // by which a dot's radius may differ from what it was: half of one under a cover looks like another size
+constexpr double good_score = 0.8;
 constexpr int recovery_rounds = 4;          // lost ones next to lost ones
 constexpr std::uint64_t longest_coast = 3;  // frames for which a velocity is believed
 
@@ -151,11 +153,13 @@ void Tracker::seek_in_new_grid(const optics::Frame& frame) {
   recover(frame);
 }
 
-Located Tracker::locate(const optics::Frame& frame, const Place& start, double radius_px, Scratch& scratch) const {
+Located Tracker::locate(const optics::Frame& frame, const Place& start, double radius_px, bool known_size, Scratch& scratch) const {
   if (!std::isfinite(start.u_px) || !std::isfinite(start.v_px)) return {};
   if (options_.method == Method::Correlation)
     return locate_by_correlation(frame, gains_, start, *disc_, options_.neighbourhood_px, scratch);
-  return locate_by_edge(frame, gains_, start, radius_px, scratch);
+  Located l = locate_by_edge(frame, gains_, start, radius_px, scratch);
+  if (known_size && std::abs(l.radius_px - radius_px) > size_part * radius_px) l.found = false;
+  return l;
 }
 
 void Tracker::search(const optics::Frame& frame) {
@@ -168,7 +172,7 @@ void Tracker::search(const optics::Frame& frame) {
       for (std::size_t begin = next.fetch_add(few); begin < sought_.size(); begin = next.fetch_add(few)) {
         for (std::size_t i = begin; i < std::min(begin + few, sought_.size()); ++i) {
           const std::size_t k = sought_[i];
-          located_[k] = locate(frame, from_[k], track_[k].radius_px, scratch);
+          located_[k] = locate(frame, from_[k], track_[k].radius_px, track_[k].sightings > 0, scratch);
         }
       }
     }
@@ -289,8 +293,9 @@ void Tracker::keep(std::uint64_t number) {
     t.last = now;
     t.seen = number;
     t.known = true;
-    // A dot keeps its size but for noise and strain.
-    if (options_.method == Method::Edge) t.radius_px += 0.2 * (l.radius_px - t.radius_px);
+    // A dot keeps its size but for noise and strain: the mean of its first sightings, then slowly on. Only of good ones.
+    if (options_.method == Method::Edge && l.score > good_score)
+      t.radius_px += (l.radius_px - t.radius_px) / static_cast<double>(t.sightings < 20 ? ++t.sightings : 100);
   }
 }
 

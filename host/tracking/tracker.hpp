@@ -60,9 +60,10 @@ class Tracker {
     Place step{};          // from frame to frame, when last seen twice running
     std::uint64_t seen{};  // frame number
     double radius_px{};
-    bool known{};  // was seen at least once
+    int sightings{};  // that the radius is a mean of; 0: only the grid's
+    bool known{};     // was seen at least once
   };
-  [[nodiscard]] Located locate(const optics::Frame& frame, const Place& start, double radius_px, Scratch& scratch) const;
+  [[nodiscard]] Located locate(const optics::Frame& frame, const Place& start, double radius_px, bool known_size, Scratch& scratch) const;
   void search(const optics::Frame& frame);
   void find_again(const optics::Frame& frame, bool grid_too);
   void seek_in_new_grid(const optics::Frame& frame);

@@ -1,168 +1,183 @@
+#include "host/tracking/tracker.hpp"
+
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <cmath>
 
-#include "scene.hpp"
+#include "host/tracking/metric.hpp"
+#include "host/tracking/plane_pose.hpp"
+#include "scenes.hpp"
 
 namespace trocar::tracking {
 namespace {
 
-using Spoil = std::function<void(int frame, std::span<const optics::MarkerTruth>, optics::Frame&)>;
+using testing::Errors;
+using testing::Film;
 
-struct Course {
-  optics::Appearance appearance{};
-  optics::MotionKind motion{optics::MotionKind::Shear};
-  int frames{200};
-  int skip_from{-1}, skip_to{-1};  // lost on the way
-  Spoil spoil{};
-};
-struct Outcome {
-  double rms_px{}, worst_px{};
-  std::size_t wrong{};  // markers further off than half a dot: on another one, or on nothing
-  std::vector<std::size_t> valid{};
-  double furthest_px{};  // that a marker went
-};
+Tracker tracker_for(const Film& film, Method method = Method::Edge) {
+  TrackerOptions options;
+  options.grid = film.grid();
+  options.method = method;
+  return Tracker(options);
+}
 
-Outcome run(Tracker& tracker, const Course& course, const std::function<void(int)>& look = {}) {
-  const optics::MarkerGrid grid = small_grid();
-  optics::Renderer renderer(small_camera(), small_pose(), grid, course.appearance, 7);
-  const optics::SyntheticMotion motion{course.motion};
-  optics::Frame frame;
-  Outcome out;
+// The figures of the whole: full image, 441 markers, the thesis's lens, 200 frames in which markers move by 5 mm, a whole step of the grid.
+struct Whole {
+  Errors pixels{};
+  double rms_m{};
+};
+Whole track_the_whole(const optics::Appearance& appearance, optics::MotionKind kind, int frames, int every) {
+  const optics::Camera camera = testing::thesis_camera();
+  Film film(camera, {}, appearance, {kind, 0.005, 0.009}, optics::thesis_m_per_px);
+  Tracker tracker = tracker_for(film);
+  Whole whole;
+  EXPECT_EQ(tracker.start(film.frame(0)), "");
+  const auto pose = fit_plane(camera.lens, film.grid(), tracker.markers());
+  EXPECT_TRUE(pose);
+  const optics::PlaneView view(camera.lens, pose->pose);
   double squares = 0.0;
   std::size_t n = 0;
-  std::vector<optics::MarkerTruth> first;
-  for (int k = 0; k < course.frames; ++k) {
-    if (k >= course.skip_from && k < course.skip_to) continue;
-    const double t_s = k / 30.0;
-    renderer.render(motion.markers(grid, t_s), motion.needle(grid, t_s), static_cast<std::uint64_t>(k), 0, frame);
-    const auto truth = renderer.truth();
-    if (course.spoil) course.spoil(k, truth, frame);
-    if (k == 0) {
-      EXPECT_EQ(tracker.start(frame), "");
-      first.assign(truth.begin(), truth.end());
-    } else {
-      tracker.update(frame);
-    }
-    out.valid.push_back(tracker.valid());
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-      out.furthest_px = std::max(out.furthest_px, std::hypot(truth[i].pixel.u_px - first[i].pixel.u_px,  //
-                                                             truth[i].pixel.v_px - first[i].pixel.v_px));
-      const Marker& m = tracker.markers()[i];
-      if (!m.valid) {
-        EXPECT_TRUE(std::isnan(m.u_px) && std::isnan(m.v_px));
-        continue;
-      }
-      const double e = distance_px(m, truth[i]);
-      out.wrong += e > 5.0 ? 1 : 0;
-      out.worst_px = std::max(out.worst_px, e);
-      squares += e * e;
+  for (int k = every; k < frames * every; k += every) {
+    auto frame = film.frame(k);
+    frame.number = static_cast<std::uint64_t>(k / every);
+    tracker.update(frame);
+    testing::add(whole.pixels, tracker.markers(), film.truth(), 11.0);
+    for (std::size_t i = 0; i < film.truth().size(); ++i) {
+      const MetricMarker m = to_plane(view, tracker.markers()[i]);
+      if (std::isnan(m.x_m)) continue;
+      squares += std::pow(m.x_m - film.truth()[i].at.x_m, 2) + std::pow(m.y_m - film.truth()[i].at.y_m, 2);
       ++n;
     }
-    if (look) look(k);
   }
-  out.rms_px = std::sqrt(squares / static_cast<double>(n));
-  return out;
+  whole.rms_m = std::sqrt(squares / static_cast<double>(n));
+  return whole;
 }
 
-// A patch of bare slab over a place, as wide as a dot and its surroundings.
-void cover(optics::Frame& frame, const optics::Pixel& at, double radius_px) {
-  for (int v = 0; v < frame.height_px; ++v)
-    for (int u = 0; u < frame.width_px; ++u)
-      if (std::hypot(u - at.u_px, v - at.v_px) < radius_px)
-        frame.pixels[static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width_px) + static_cast<std::size_t>(u)] =
-            static_cast<std::uint8_t>(190 + (u * 7 + v * 3) % 5);
+TEST(Tracker, CleanFramesOfTheWholePhantomToATwentiethOfAPixel) {
+  optics::Appearance appearance = optics::clean_appearance();
+  appearance.read_noise = 1.2;  // grey levels: a good sensor's
+  appearance.shot_noise = 0.03;
+  const Whole whole = track_the_whole(appearance, optics::MotionKind::Shear, 60, 2);
+  EXPECT_LT(whole.pixels.rms_px, 0.05);
+  EXPECT_EQ(whole.pixels.lost, 0u);
+  EXPECT_EQ(whole.pixels.wrong, 0u);
+  EXPECT_LT(whole.rms_m, 1e-5);
 }
 
-class EachMethod : public ::testing::TestWithParam<Method> {
- protected:
-  [[nodiscard]] static TrackerOptions options() { return {small_grid(), GetParam(), 2, 41}; }
-};
-
-TEST_P(EachMethod, KeepsMarkersApartWhileTheyMoveByAStepOfTheGrid) {
-  Tracker tracker(options());
-  const Outcome out = run(tracker, {optics::hard_appearance()});
-  EXPECT_GT(out.furthest_px, 55.0);  // of 62 from marker to marker
-  EXPECT_EQ(out.wrong, 0U);
-  EXPECT_EQ(std::ranges::min(out.valid), 81U);
-  EXPECT_LT(out.rms_px, GetParam() == Method::Edge ? 0.08 : 0.4);
+TEST(Tracker, HardFramesOfTheWholePhantomOverTwoHundredFrames) {
+  const Whole whole = track_the_whole(optics::hard_appearance(), optics::MotionKind::Insertion, 200, 1);
+  EXPECT_LT(whole.pixels.rms_px, 0.15);
+  EXPECT_EQ(whole.pixels.wrong, 0u);
+  EXPECT_LT(whole.pixels.lost, 441u * 200u / 1000u);
+  EXPECT_LT(whole.rms_m, 1e-5);
 }
 
-TEST_P(EachMethod, IsExactInAClearImage) {
-  Tracker tracker(options());
-  Course course{optics::clean_appearance()};
-  course.frames = 20;
-  const Outcome out = run(tracker, course);
-  EXPECT_LT(out.rms_px, GetParam() == Method::Edge ? 0.04 : 0.15);
+TEST(Tracker, TheThesissMethodFollowsAsWell) {
+  Film film = testing::small_film(optics::MotionKind::Insertion, optics::hard_appearance());
+  Tracker tracker = tracker_for(film, Method::Correlation);
+  ASSERT_EQ(tracker.start(film.frame(0)), "");
+  Errors e;
+  for (int k = 1; k < 60; ++k) {
+    tracker.update(film.frame(k));
+    testing::add(e, tracker.markers(), film.truth(), 5.0);
+  }
+  EXPECT_EQ(e.wrong, 0u);
+  EXPECT_LT(e.lost, 60u);
+  EXPECT_LT(e.rms_px, 0.3);
 }
 
-TEST_P(EachMethod, LosesWhatIsCoveredAndFindsItAgain) {
-  Tracker tracker(options());
-  Course course{optics::hard_appearance()};
-  course.frames = 120;
-  const std::vector<std::size_t> covered{0, 30, 31, 39, 40, 41, 49, 50, 44, 80};
-  course.spoil = [&](int k, std::span<const optics::MarkerTruth> truth, optics::Frame& frame) {
-    if (k < 10 || k >= 90) return;
-    for (const std::size_t i : covered) cover(frame, truth[i].pixel, 24.0);
-  };
-  const Outcome out = run(tracker, course, [&](int k) {
-    for (const std::size_t i : covered) {
-      EXPECT_EQ(tracker.markers()[i].valid, k < 10 || k >= 90) << "marker " << i << " frame " << k;
+TEST(Tracker, CoveredMarkersAreFlaggedAndComeBackAsThemselves) {
+  for (const int level : {202, 30, 255}) {
+    Film film = testing::small_film(optics::MotionKind::Shear);
+    Tracker tracker = tracker_for(film);
+    ASSERT_EQ(tracker.start(film.frame(0)), "");
+    Errors e;
+    std::size_t flagged = 0;
+    for (int k = 1; k < 60; ++k) {
+      auto& frame = const_cast<optics::Frame&>(film.frame(k));
+      const bool covered = k >= 10 && k < 45;  // meanwhile everything moves by more than half a step
+      if (covered) film.cover(343, 257, 75, static_cast<std::uint8_t>(level));
+      tracker.update(frame);
+      testing::add(e, tracker.markers(), film.truth(), 4.0);
+      for (std::size_t i = 0; i < film.truth().size(); ++i) {
+        const auto& p = film.truth()[i].pixel;
+        if (covered && std::hypot(p.u_px - 343, p.v_px - 257) < 75 - 8) {
+          EXPECT_FALSE(tracker.markers()[i].valid) << "frame " << k << " marker " << i << " level " << level;
+          EXPECT_TRUE(std::isnan(tracker.markers()[i].u_px));
+          ++flagged;
+        }
+      }
     }
-  });
-  EXPECT_EQ(out.wrong, 0U);
-  EXPECT_EQ(out.valid[50], 81U - covered.size());
+    EXPECT_GT(flagged, 100u);
+    EXPECT_EQ(e.wrong, 0u) << level;
+    EXPECT_EQ(tracker.valid(), film.grid().markers()) << level;
+  }
 }
 
-TEST_P(EachMethod, GoesOnAfterLostFramesInWhichMarkersWentFar) {
-  Tracker tracker(options());
-  Course course{optics::hard_appearance()};
-  course.frames = 80;
-  course.skip_from = 4;
-  course.skip_to = 30;
-  const Outcome out = run(tracker, course);
-  EXPECT_EQ(out.wrong, 0U);
-  EXPECT_EQ(out.valid.back(), 81U);
+TEST(Tracker, FramesMayBeMissing) {
+  Film film = testing::small_film(optics::MotionKind::Shear);
+  Tracker tracker = tracker_for(film);
+  ASSERT_EQ(tracker.start(film.frame(0)), "");
+  Errors e;
+  for (const int k : {1, 2, 3, 6, 7, 12, 13, 14, 22, 23, 24, 60, 61, 99}) {  // the last ones after more than half a step
+    tracker.update(film.frame(k));
+    testing::add(e, tracker.markers(), film.truth(), 4.0);
+  }
+  EXPECT_EQ(e.wrong, 0u);
+  EXPECT_EQ(tracker.valid(), film.grid().markers());
 }
 
-TEST_P(EachMethod, SeesNothingInDarkFramesAndEverythingAfter) {
-  Tracker tracker(options());
-  Course course{optics::hard_appearance()};
-  course.frames = 40;
-  course.spoil = [](int k, std::span<const optics::MarkerTruth>, optics::Frame& frame) {
-    if (k >= 5 && k < 20) std::ranges::fill(frame.pixels, std::uint8_t{0});
-  };
-  const Outcome out = run(tracker, course);
-  EXPECT_EQ(out.wrong, 0U);
-  for (std::size_t k = 0; k < out.valid.size(); ++k) EXPECT_EQ(out.valid[k], k >= 5 && k < 20 ? 0U : 81U) << k;
+TEST(Tracker, InDarknessAllAreLostAndAfterwardsFound) {
+  Film film = testing::small_film(optics::MotionKind::Shear);
+  Tracker tracker = tracker_for(film);
+  ASSERT_EQ(tracker.start(film.frame(0)), "");
+  optics::Frame black = film.frame(1);
+  std::ranges::fill(black.pixels, std::uint8_t{0});
+  for (std::uint64_t k = 1; k < 10; ++k) {
+    black.number = k;
+    tracker.update(black);
+    EXPECT_EQ(tracker.valid(), 0u);
+  }
+  tracker.update(film.frame(40));  // a step of the grid later
+  EXPECT_EQ(tracker.valid(), film.grid().markers());
+  Errors e;
+  testing::add(e, tracker.markers(), film.truth(), 4.0);
+  EXPECT_EQ(e.wrong, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tracker, EachMethod, ::testing::Values(Method::Edge, Method::Correlation),
-                         [](const auto& method) { return method.param == Method::Edge ? "Edge" : "Correlation"; });
-
-TEST(Tracker, StartsFromPlacesThatAreOffByPartOfADot) {
-  const optics::MarkerGrid grid = small_grid();
-  optics::Renderer renderer(small_camera(), small_pose(), grid, optics::clean_appearance(), 7);
-  optics::Frame frame;
-  renderer.render(optics::SyntheticMotion{}.markers(grid, 0.0), {}, 0, 0, frame);
+TEST(Tracker, StartsFromGivenPlacesAndSaysWhenNothingIsThere) {
+  Film film = testing::small_film(optics::MotionKind::Still);
+  const auto& frame = film.frame(0);
   std::vector<Place> places;
-  for (const optics::MarkerTruth& t : renderer.truth()) places.push_back({t.pixel.u_px + 4.0, t.pixel.v_px - 3.0});
-  places[40] = {std::nan(""), std::nan("")};
-  Tracker tracker({grid});
-  ASSERT_EQ(tracker.start(frame, places, 11.0), "");
-  EXPECT_EQ(tracker.valid(), 81U);
-  for (std::size_t k = 0; k < 81; ++k) EXPECT_LT(distance_px(tracker.markers()[k], renderer.truth()[k]), 0.1);
+  for (const auto& t : film.truth()) places.push_back({t.pixel.u_px + 3.0, t.pixel.v_px - 3.0});
+  Tracker tracker = tracker_for(film);
+  EXPECT_EQ(tracker.start(frame, places, 7.6), "");
+  EXPECT_EQ(tracker.valid(), film.grid().markers());
+  optics::Frame black = frame;
+  std::ranges::fill(black.pixels, std::uint8_t{0});
+  EXPECT_NE(tracker.start(black, places, 7.6).find("0 of 63 markers were found"), std::string::npos);
+  EXPECT_NE(tracker.start(black), "");
 }
 
-TEST(Tracker, AnswersTheSameWithOneThreadAsWithFour) {
-  Tracker one({small_grid(), Method::Edge, 1, 41}), four({small_grid(), Method::Edge, 4, 41});
-  Course course{optics::hard_appearance()};
-  course.frames = 10;
-  run(one, course);
-  run(four, course);
-  for (std::size_t k = 0; k < 81; ++k) {
-    EXPECT_EQ(one.markers()[k].u_px, four.markers()[k].u_px);
-    EXPECT_EQ(one.markers()[k].v_px, four.markers()[k].v_px);
+TEST(Tracker, ThreadsChangeNothing) {
+  Film film = testing::small_film(optics::MotionKind::Insertion, optics::hard_appearance());
+  TrackerOptions options;
+  options.grid = film.grid();
+  options.threads = 1;
+  Tracker one(options);
+  options.threads = 3;
+  Tracker three(options);
+  ASSERT_EQ(one.start(film.frame(0)), "");
+  ASSERT_EQ(three.start(film.last()), "");
+  for (int k = 1; k < 10; ++k) {
+    one.update(film.frame(k));
+    three.update(film.last());
+    for (std::size_t i = 0; i < film.grid().markers(); ++i) {
+      ASSERT_EQ(one.markers()[i].valid, three.markers()[i].valid);
+      if (one.markers()[i].valid) {
+        EXPECT_EQ(one.markers()[i].u_px, three.markers()[i].u_px);
+      }
+    }
   }
 }
 
