@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,17 +10,24 @@ namespace trocar::tracking {
 namespace {
 
 constexpr int rays = 48;
-constexpr int passes = 3;  // rays anew from the centre found; each reaches less far than the one before
-constexpr int reweightings = 4;
-constexpr double tukey = 4.685;  // 95 % efficient for normal noise
+constexpr int passes = 3;            // rays anew from the centre found; each reaches less far than the one before
+constexpr int reweightings = 4;      // in the last of them
+constexpr double oval_part = 0.015;  // of the radius: how far dots are expected to be from round, on two axes of ovality
+constexpr double tukey = 4.685;      // 95 % efficient for normal noise
 constexpr double least_scale_px = 0.03;
+constexpr float hole_px = 0.3F;                      // half-way point and integral further apart than this: something lies on the ray
+constexpr double most_deviation_px = 0.2;            // of a centre that is believed
+constexpr double agree_px = 0.75, agree_part = 0.1;  // of the radius: a ray within the larger of them supports the outline
 
 struct Directions {
   std::array<double, rays> cosine{}, sine{};
+  std::array<Eigen::Matrix<double, 5, 1>, rays> basis{};  // 1, cos, sin, cos 2, sin 2
   Directions() {
-    for (int k = 0; k < rays; ++k) {
-      cosine[static_cast<std::size_t>(k)] = std::cos(2.0 * std::numbers::pi * k / rays);
-      sine[static_cast<std::size_t>(k)] = std::sin(2.0 * std::numbers::pi * k / rays);
+    for (std::size_t k = 0; k < rays; ++k) {
+      const double a = 2.0 * std::numbers::pi * static_cast<double>(k) / rays;
+      cosine[k] = std::cos(a);
+      sine[k] = std::sin(a);
+      basis[k] << 1.0, cosine[k], sine[k], std::cos(2.0 * a), std::sin(2.0 * a);
     }
   }
 };
@@ -90,7 +98,8 @@ float between_pixels(const Window& window, float u, float v) noexcept {
 }
 
 // Distance of the edge from the centre on each ray; NaN where the levels show none.
-void find_edges(const Window& window, double u, double v, double radius, double reach, float contrast, std::vector<float>& edge) noexcept {
+void find_edges(const Window& window, double u, double v, double radius, double reach, float contrast, float tolerance,
+                std::vector<float>& edge) noexcept {
   constexpr int ends = 2;  // samples whose mean is the level inside, and outside
   const int samples = 2 * static_cast<int>(std::ceil(reach)) + 1;
   const auto first = static_cast<float>(radius - 0.5 * (samples - 1));
@@ -112,13 +121,23 @@ void find_edges(const Window& window, double u, double v, double radius, double 
     if (step < contrast) continue;
     float sum = 0.0F;
     for (int i = 0; i < samples; ++i) sum += std::clamp((outside - level[static_cast<std::size_t>(i)]) / step, -0.25F, 1.25F);
-    edge[k] = first + sum - 0.5F;
+    const float e = first + sum - 0.5F;
+    // Where half of the step is passed, from outside: the same place unless something lies on the ray, such as a hole.
+    const float half = 0.5F * (inside + outside);
+    int i = samples - 1;
+    while (i > 0 && level[static_cast<std::size_t>(i)] > half) --i;
+    const float below = level[static_cast<std::size_t>(i)], above = level[static_cast<std::size_t>(std::min(i + 1, samples - 1))];
+    const float crossing = first + static_cast<float>(i) + (above > below ? (half - below) / (above - below) : 0.0F);
+    if (std::abs(crossing - e) > tolerance) continue;
+    edge[k] = e;
   }
 }
 
-struct Circle {
+struct Outline {
   double du{}, dv{}, radius{};
-  double agreeing{};  // part of the rays, by weight
+  std::array<double, 2> oval{};
+  double agreeing{};      // part of the rays
+  double deviation_px{};  // of the centre, if each ray strayed as the median one does
   std::array<double, 3> covariance{};
 };
 
@@ -128,8 +147,12 @@ float median_of(std::vector<float>& values) noexcept {
   return *middle;
 }
 
-// Least squares of e = r + du cos + dv sin with Tukey's biweight.
-bool fit_circle(Scratch& s, double radius, Circle& circle) noexcept {
+using Vector5 = Eigen::Matrix<double, 5, 1>;
+using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+// Least squares of e = r + du cos + dv sin + oval (cos 2, sin 2) with Tukey's biweight. `oval` is drawn towards what is known of it.
+bool fit_outline(Scratch& s, double radius, const std::array<double, 2>& oval, double oval_deviation_px, int rounds,
+                 Outline& out) noexcept {
   s.weight.assign(rays, 1.0F);
   s.residual.assign(rays, 0.0F);
   s.sorted.clear();
@@ -137,46 +160,53 @@ bool fit_circle(Scratch& s, double radius, Circle& circle) noexcept {
   for (const float e : s.edge)
     if (!std::isnan(e)) s.sorted.push_back(e);
   if (s.sorted.size() < rays / 3) return false;
-  circle = {0.0, 0.0, static_cast<double>(median_of(s.sorted)), 0.0, {}};
-  if (!(circle.radius > 0.3 * radius)) return false;
-  for (int round = 0; round < reweightings; ++round) {
+  Vector5 x;
+  x << static_cast<double>(median_of(s.sorted)), 0.0, 0.0, oval[0], oval[1];
+  if (!(x[0] > 0.3 * radius)) return false;
+  for (int round = 0; round < rounds; ++round) {
     s.sorted.clear();
     for (std::size_t k = 0; k < rays; ++k) {
       if (std::isnan(s.edge[k])) continue;
-      s.residual[k] = s.edge[k] - static_cast<float>(circle.radius + circle.du * direction.cosine[k] + circle.dv * direction.sine[k]);
+      s.residual[k] = s.edge[k] - static_cast<float>(direction.basis[k].dot(x));
       s.sorted.push_back(std::abs(s.residual[k]));
     }
-    const double limit = tukey * std::max(least_scale_px, static_cast<double>(median_of(s.sorted)) / 0.6745);
-    double n = 0, c = 0, d = 0, cc = 0, cd = 0, dd = 0, e = 0, ec = 0, ed = 0, squares = 0;
+    const double scale = std::max(least_scale_px, static_cast<double>(median_of(s.sorted)) / 0.6745), limit = tukey * scale;
+    Matrix5 normal = Matrix5::Zero();
+    Vector5 right = Vector5::Zero();
+    double n = 0.0, squares = 0.0;
     for (std::size_t k = 0; k < rays; ++k) {
       if (std::isnan(s.edge[k])) continue;
       const double r = static_cast<double>(s.residual[k]) / limit;
-      const double w = std::abs(r) < 1.0 ? (1.0 - r * r) * (1.0 - r * r) : 0.0;
-      const double x = direction.cosine[k], y = direction.sine[k], value = static_cast<double>(s.edge[k]);
-      n += w;
-      c += w * x;
-      d += w * y;
-      cc += w * x * x;
-      cd += w * x * y;
-      dd += w * y * y;
-      e += w * value;
-      ec += w * value * x;
-      ed += w * value * y;
+      if (std::abs(r) >= 1.0) continue;
+      const double w = (1.0 - r * r) * (1.0 - r * r);
+      const Vector5 weighted = w * direction.basis[k];
+      normal.noalias() += weighted * direction.basis[k].transpose();
+      right += static_cast<double>(s.edge[k]) * weighted;
       squares += w * static_cast<double>(s.residual[k]) * static_cast<double>(s.residual[k]);
+      n += w;
     }
     if (n < rays / 4.0) return false;
-    // The radius eliminated: two by two remain.
-    const double a = cc - c * c / n, b = cd - c * d / n, f = dd - d * d / n;
-    const double determinant = a * f - b * b;
-    if (!(determinant > 1e-3 * n * n)) return false;  // the rays left are all on one side
-    const double p = ec - e * c / n, q = ed - e * d / n;
-    circle.du = (f * p - b * q) / determinant;
-    circle.dv = (a * q - b * p) / determinant;
-    circle.radius = (e - circle.du * c - circle.dv * d) / n;
-    const double variance = squares / std::max(1.0, n - 3.0);
-    circle.covariance = {variance * f / determinant, -variance * b / determinant, variance * a / determinant};
-    circle.agreeing = n / rays;
+    const double pull = scale * scale / (oval_deviation_px * oval_deviation_px);
+    for (const Eigen::Index k : {3, 4}) {
+      normal(k, k) += pull;
+      right[k] += pull * oval[static_cast<std::size_t>(k) - 3U];
+    }
+    const Eigen::LLT<Matrix5> factor(normal);
+    if (factor.info() != Eigen::Success) return false;
+    x = factor.solve(right);
+    const Matrix5 inverse = factor.solve(Matrix5::Identity());
+    const double variance = squares / (tukey_variance * std::max(1.0, n - 5.0));
+    out.deviation_px = scale * std::sqrt(inverse(1, 1) + inverse(2, 2));
+    out.covariance = {variance * inverse(1, 1), variance * inverse(1, 2), variance * inverse(2, 2)};
   }
+  const double near = std::max(agree_px, agree_part * x[0]);
+  out.agreeing = 0.0;
+  for (std::size_t k = 0; k < rays; ++k)
+    if (std::abs(static_cast<double>(s.edge[k]) - direction.basis[k].dot(x)) < near) out.agreeing += 1.0 / rays;
+  out.radius = x[0];
+  out.du = x[1];
+  out.dv = x[2];
+  out.oval = {x[3], x[4]};
   return true;
 }
 
@@ -206,25 +236,27 @@ Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Pla
   if (!there) return out;
 
   double radius = std::clamp(std::sqrt(blob.area_px / std::numbers::pi), 0.7 * radius_px, 1.4 * radius_px);
-  const double least_reach = std::min(4.0, 0.45 * radius_px);
+  const double least_reach = std::min(4.0, 0.65 * radius_px);
   double reach = std::max(least_reach, 0.45 * radius_px);
-  Circle circle;
+  Outline outline;
   for (int k = 0; k < passes; ++k) {
-    find_edges(scratch.window, centre.u_px, centre.v_px, radius, reach, 0.35F * (levels.bright - levels.dark), scratch.edge);
-    if (!fit_circle(scratch, radius_px, circle)) return out;
-    centre.u_px += circle.du;
-    centre.v_px += circle.dv;
-    radius = circle.radius;
+    find_edges(scratch.window, centre.u_px, centre.v_px, radius, reach, 0.35F * (levels.bright - levels.dark), k == 0 ? 9.0F : hole_px,
+               scratch.edge);
+    if (!fit_outline(scratch, radius_px, {}, oval_part * radius_px, k + 1 < passes ? 2 : reweightings, outline)) return out;
+    centre.u_px += outline.du;
+    centre.v_px += outline.dv;
+    radius = outline.radius;
     if (std::hypot(centre.u_px - blob.u_px, centre.v_px - blob.v_px) > search) return out;
     reach = least_reach;
   }
   out.u_px = centre.u_px;
   out.v_px = centre.v_px;
   out.radius_px = radius;
-  out.score = std::min(1.0, circle.agreeing);
+  out.score = std::min(1.0, outline.agreeing);
   // Rays less than two pixels apart at the edge share their samples' noise.
   const double shared = std::max(1.0, rays * 2.0 / (2.0 * std::numbers::pi * std::max(radius, 1.0)));
-  for (std::size_t k = 0; k < 3; ++k) out.covariance[k] = shared * circle.covariance[k];
+  for (std::size_t k = 0; k < 3; ++k) out.covariance[k] = shared * outline.covariance[k];
+  if (outline.deviation_px > most_deviation_px) return out;  // the rays left are all on one side
   out.found = out.score >= least_rays && radius > 0.6 * radius_px && radius < 1.6 * radius_px && std::isfinite(radius);
   return out;
 }

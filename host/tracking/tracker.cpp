@@ -29,7 +29,11 @@ Tracker::Tracker(const TrackerOptions& options)
       track_(options.grid.markers()),
       marker_(options.grid.markers()),
       located_(options.grid.markers()),
-      scratch_(static_cast<std::size_t>(std::max(1, options.threads))) {}
+      scratch_(static_cast<std::size_t>(std::max(1, options.threads))),
+      from_(options.grid.markers()),
+      tried_(options.grid.markers()) {
+  sought_.reserve(options.grid.markers());
+}
 
 std::size_t Tracker::valid() const noexcept {
   return static_cast<std::size_t>(std::ranges::count_if(marker_, [](const Marker& m) { return m.valid; }));
@@ -45,11 +49,14 @@ std::string Tracker::start(const optics::Frame& frame) {
   gains_ = white_balance(frame);
   DetectedGrid grid = detect_grid(frame, gains_, options_.grid);
   if (!grid.problem.empty()) return grid.problem;
-  return start(frame, std::move(grid.place), grid.radius_px);
+  std::string problem = start(frame, std::move(grid.place), grid.radius_px);
+  detected_ = true;
+  return problem;
 }
 
 std::string Tracker::start(const optics::Frame& frame, std::vector<Place> places, double radius_px) {
   gains_ = white_balance(frame);
+  detected_ = false;
   number_ = frame.number;
   radius_px_ = radius_px;
   disc_.emplace(radius_px);
@@ -69,14 +76,16 @@ std::string Tracker::start(const optics::Frame& frame, std::vector<Place> places
     std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
     step_px_ = steps[steps.size() / 2];
   }
-  std::vector<std::size_t> all(track_.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
+  sought_.resize(track_.size());
+  std::iota(sought_.begin(), sought_.end(), std::size_t{0});
+  from_ = places;
+  std::ranges::fill(located_, Located{});
   for (std::size_t k = 0; k < track_.size(); ++k) {
     track_[k] = {};
     track_[k].rest = track_[k].last = places[k];
     track_[k].radius_px = radius_px;
   }
-  search(frame, all, places);
+  search(frame);
   judge();
   recover(frame);
   for (std::size_t k = 0; k < track_.size(); ++k)
@@ -88,35 +97,58 @@ std::string Tracker::start(const optics::Frame& frame, std::vector<Place> places
   return {};
 }
 
-void Tracker::update(const optics::Frame& frame) {
-  const std::uint64_t elapsed = std::max<std::uint64_t>(1, frame.number > number_ ? frame.number - number_ : 1);
-  number_ = frame.number;
-  std::vector<std::size_t> which;
-  std::vector<Place> from(track_.size());
-  for (std::size_t k = 0; k < track_.size(); ++k) {
-    located_[k] = {};
-    const Track& t = track_[k];
-    if (!marker_[k].valid) continue;
-    const auto frames = static_cast<double>(std::min(elapsed, longest_coast));
-    from[k] = {t.last.u_px + frames * t.step.u_px, t.last.v_px + frames * t.step.v_px};
-    which.push_back(k);
+std::span<const Marker> Tracker::update(const optics::Frame& frame) {
+  const std::uint64_t elapsed = frame.number > number_ ? frame.number - number_ : 1;
+  std::ranges::fill(located_, Located{});
+  if (elapsed > longest_coast) seek_in_new_grid(frame);
+  if (2 * found() < located_.size()) {
+    sought_.clear();
+    for (std::size_t k = 0; k < track_.size(); ++k) {
+      const Track& t = track_[k];
+      if (!marker_[k].valid || located_[k].found) continue;
+      const auto frames = static_cast<double>(std::min(elapsed, longest_coast));
+      from_[k] = {t.last.u_px + frames * t.step.u_px, t.last.v_px + frames * t.step.v_px};
+      sought_.push_back(k);
+    }
+    search(frame);
+    judge();
+    recover(frame);
+    if (2 * found() < located_.size()) find_again(frame, elapsed <= longest_coast);
   }
-  search(frame, which, from);
-  judge();
-  recover(frame);
-  if (std::ranges::count_if(located_, &Located::found) < std::min<std::ptrdiff_t>(3, static_cast<std::ptrdiff_t>(located_.size())))
-    find_anew(frame);
+  if (2 * found() >= located_.size()) number_ = frame.number;
   keep(frame.number);
+  return marker_;
 }
 
-// All are lost (darkness, a hand before the lens): nothing says where to look but the whole image. Only the whole grid tells who is who.
-void Tracker::find_anew(const optics::Frame& frame) {
-  DetectedGrid grid = detect_grid(frame, gains_, options_.grid);
+std::size_t Tracker::found() const noexcept {
+  return static_cast<std::size_t>(std::ranges::count_if(located_, [](const Located& l) { return l.found; }));
+}
+
+// Most markers are lost, so that neighbours say little.
+void Tracker::find_again(const optics::Frame& frame, bool grid_too) {
+  sought_.clear();
+  for (std::size_t k = 0; k < track_.size(); ++k) {
+    if (located_[k].found || !track_[k].known) continue;
+    from_[k] = track_[k].last;
+    sought_.push_back(k);
+  }
+  search(frame);
+  judge();
+  recover(frame);
+  if (grid_too && 2 * found() < located_.size()) seek_in_new_grid(frame);
+}
+
+void Tracker::seek_in_new_grid(const optics::Frame& frame) {
+  if (!detected_) return;
+  const DetectedGrid grid = detect_grid(frame, gains_, options_.grid);
   if (!grid.problem.empty()) return;
-  fill_missing(grid.place, options_.grid);
-  std::vector<std::size_t> all(track_.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  search(frame, all, grid.place);
+  sought_.clear();
+  for (std::size_t k = 0; k < track_.size(); ++k) {
+    located_[k] = {};
+    from_[k] = grid.place[k];
+    if (std::isfinite(from_[k].u_px)) sought_.push_back(k);
+  }
+  search(frame);
   judge();
   recover(frame);
 }
@@ -130,20 +162,24 @@ Located Tracker::locate(const optics::Frame& frame, const Place& start, double r
   return l;
 }
 
-void Tracker::search(const optics::Frame& frame, const std::vector<std::size_t>& which, const std::vector<Place>& from) {
+void Tracker::search(const optics::Frame& frame) {
   // Each thread takes the next few markers: lost ones cost more, and are not spread evenly.
   constexpr std::size_t few = 16;
   std::atomic<std::size_t> next{0};
   const auto work = [&](const cv::Range& range) {
     for (int t = range.start; t < range.end; ++t) {
       Scratch& scratch = scratch_[static_cast<std::size_t>(t)];
-      for (std::size_t begin = next.fetch_add(few); begin < which.size(); begin = next.fetch_add(few))
-        for (std::size_t i = begin; i < std::min(begin + few, which.size()); ++i)
-          located_[which[i]] = locate(frame, from[which[i]], track_[which[i]].radius_px, track_[which[i]].sightings > 0, scratch);
+      for (std::size_t begin = next.fetch_add(few); begin < sought_.size(); begin = next.fetch_add(few)) {
+        for (std::size_t i = begin; i < std::min(begin + few, sought_.size()); ++i) {
+          const std::size_t k = sought_[i];
+          located_[k] = locate(frame, from_[k], track_[k].radius_px, track_[k].sightings > 0, scratch);
+        }
+      }
     }
   };
+  // OpenCV's own pool, which stays.
   const cv::Range threads(0, static_cast<int>(scratch_.size()));
-  if (scratch_.size() == 1 || which.size() <= few)
+  if (scratch_.size() == 1 || sought_.size() <= few)
     work({0, 1});
   else
     cv::parallel_for_(threads, work, static_cast<double>(scratch_.size()));
@@ -220,24 +256,23 @@ void Tracker::judge() {
 }
 
 void Tracker::recover(const optics::Frame& frame) {
-  std::vector<bool> tried(located_.size());
+  std::ranges::fill(tried_, 0);
   for (int round = 0; round < recovery_rounds; ++round) {
-    std::vector<std::size_t> lost;
-    std::vector<Place> from(located_.size());
+    sought_.clear();
     for (std::size_t k = 0; k < located_.size(); ++k) {
-      if (located_[k].found || tried[k]) continue;
+      if (located_[k].found || tried_[k] != 0) continue;
       auto place = expected(k);
       // Alone in the image: where it was last.
       if (!place && located_.size() == 1) place = track_[k].last;
       if (!place || !std::isfinite(place->u_px)) continue;
-      from[k] = *place;
-      tried[k] = true;
-      lost.push_back(k);
+      from_[k] = *place;
+      tried_[k] = 1;
+      sought_.push_back(k);
     }
-    if (lost.empty()) return;
-    search(frame, lost, from);
-    for (const std::size_t k : lost)
-      if (located_[k].found && distance({located_[k].u_px, located_[k].v_px}, from[k]) > stray_part * step_px_) located_[k].found = false;
+    if (sought_.empty()) return;
+    search(frame);
+    for (const std::size_t k : sought_)
+      if (located_[k].found && distance({located_[k].u_px, located_[k].v_px}, from_[k]) > stray_part * step_px_) located_[k].found = false;
     judge();
   }
 }
