@@ -26,6 +26,7 @@ install(FILES ${linux}/BARE_PC.md ${linux}/REALTIME.md ${CMAKE_SOURCE_DIR}/commo
   DESTINATION share/doc/trocar-rig COMPONENT rig)
 
 # What Debian asks of every package. gzip without time and name: the same bytes each time.
+string(TIMESTAMP year "%Y" UTC)
 string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(maintainer "The trocar authors <maintainers@trocar.invalid>")
 foreach(component IN ITEMS rig host camera)
@@ -39,10 +40,10 @@ foreach(component IN ITEMS rig host camera)
   endif()
   set(COPYRIGHT_COMMENT ${comment})
   configure_file(${here}/copyright.in ${made}/${component}/copyright @ONLY)
-  file(WRITE ${made}/${component}/changelog.Debian
+  file(WRITE ${made}/${component}/changelog
     "${package} (${TROCAR_PACKAGE_VERSION}) bookworm; urgency=medium\n\n  * Built from this version of the sources; their history says what changed.\n\n -- ${maintainer}  ${date}\n")
-  execute_process(COMMAND gzip -9nf ${made}/${component}/changelog.Debian COMMAND_ERROR_IS_FATAL ANY)
-  install(FILES ${made}/${component}/copyright ${made}/${component}/changelog.Debian.gz DESTINATION share/doc/${package} COMPONENT ${component})
+  execute_process(COMMAND gzip -9nf ${made}/${component}/changelog COMMAND_ERROR_IS_FATAL ANY)
+  install(FILES ${made}/${component}/copyright ${made}/${component}/changelog.gz DESTINATION share/doc/${package} COMPONENT ${component})
   install(FILES ${here}/${package}.lintian DESTINATION share/lintian/overrides RENAME ${package} COMPONENT ${component})
 endforeach()
 
@@ -74,22 +75,26 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
 
 set(CPACK_DEBIAN_RIG_PACKAGE_NAME trocar-rig)
 set(CPACK_COMPONENT_RIG_DESCRIPTION "real-time controller of a needle-insertion rig
-Runs the 1 kHz loop of a planar twin pantograph that drives a needle into soft tissue, or lets a hand feel a virtual one: as a systemd
-service of its own user, on CAN buses or on a simulated rig. Nothing moves before a host arms it.")
+Runs the 1 kHz loop of a planar twin pantograph that drives a needle into
+soft tissue, or lets a hand feel a virtual one: as a systemd service of its
+own user, on CAN buses or on a simulated rig. Nothing moves before a host
+arms it.")
 set(CPACK_DEBIAN_RIG_PACKAGE_DEPENDS "adduser, iproute2")
 set(CPACK_DEBIAN_RIG_PACKAGE_CONTROL_EXTRA "${made}/preinst;${made}/postinst;${made}/prerm;${made}/postrm;${made}/conffiles")
 
 set(CPACK_DEBIAN_HOST_PACKAGE_NAME trocar)
 set(CPACK_COMPONENT_HOST_DESCRIPTION "host and simulated rig of a needle-insertion rig
-Command line that homes, arms and watches a rig, runs experiments, records and reports them, and computes needles in tissue; with a
-simulated rig behind the same wire.")
+Command line that homes, arms and watches a rig, runs experiments, records
+and reports them, and computes needles in tissue; with a simulated rig behind
+the same wire.")
 set(CPACK_DEBIAN_HOST_PACKAGE_DEPENDS "trocar-rig (= ${TROCAR_PACKAGE_VERSION})")
 # Figures of reports; keys for a network.
 set(CPACK_DEBIAN_HOST_PACKAGE_RECOMMENDS "gnuplot-nox | gnuplot, openssl, trocar-camera (= ${TROCAR_PACKAGE_VERSION})")
 
 set(CPACK_DEBIAN_CAMERA_PACKAGE_NAME trocar-camera)
 set(CPACK_COMPONENT_CAMERA_DESCRIPTION "camera commands for a needle-insertion rig
-Calibrates and reads cameras, rectifies their images, registers them to the rig, follows the markers of a phantom: what trocar camera
-and trocar track start.")
+Calibrates and reads cameras, rectifies their images, registers them to the
+rig, follows the markers of a phantom: what trocar camera and trocar track
+start.")
 set(CPACK_DEBIAN_CAMERA_PACKAGE_DEPENDS "trocar (= ${TROCAR_PACKAGE_VERSION})")
 include(CPack)
