@@ -5,6 +5,7 @@
 
 set(TROCAR_MARCH "" CACHE STRING "value for -march; empty leaves the compiler's default")
 set(TROCAR_SANITIZE "" CACHE STRING "sanitizers, comma separated; empty for none")
+set(TROCAR_FUZZ OFF CACHE BOOL "instrument for libFuzzer (clang only): tests/fuzz")
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -28,6 +29,10 @@ endif()
 if(TROCAR_SANITIZE)
   target_compile_options(trocar_options INTERFACE -fsanitize=${TROCAR_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(trocar_options INTERFACE -fsanitize=${TROCAR_SANITIZE})
+endif()
+
+if(TROCAR_FUZZ)
+  target_compile_options(trocar_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 # Real-time code: neither exceptions nor run-time type information exist there.

@@ -1,0 +1,44 @@
+// Captures, whole, cut off or damaged: everything that is handed out is counted, belongs to a declared channel and lies in the selection;
+// what does not decode is said.
+#include "common/capture/rig_capture.hpp"
+#include "memory_file.hpp"
+
+using namespace trocar;
+using fuzz::require;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::filesystem::path file = fuzz::memory_file(data, size);
+  try {
+    capture::McapReader reader(file);
+    std::uint64_t messages = 0;
+    std::uint64_t bytes = 0;
+    const capture::ReadReport all = reader.read([&](const capture::Message& message) {
+      require(message.channel != nullptr && reader.channels().contains(message.channel->id), "messages have a channel");
+      ++messages;
+      bytes += message.data.size();
+    });
+    require(messages == all.messages, "every message is counted");
+    require(bytes <= size && all.lost_bytes <= size, "no more comes out than went in");
+    require(all.finished == reader.finished(), "finished is finished");
+
+    const capture::Selection part{.topics = {"rig/samples"}, .from_ns = 1000, .to_ns = 2'000'000'000};
+    std::uint64_t selected = 0;
+    const capture::ReadReport some = reader.read(
+        [&](const capture::Message& message) {
+          require(part.topics.contains(message.channel->topic), "of the topics asked for");
+          require(message.log_time_ns >= part.from_ns && message.log_time_ns <= part.to_ns, "of the time asked for");
+          ++selected;
+        },
+        part);
+    require(selected == some.messages && selected <= messages, "a part is no more than the whole");
+  } catch (const capture::CaptureError& refusal) {
+    require(refusal.what()[0] != '\0', "a refusal says why");
+  }
+  try {
+    const capture::RigLog log = capture::read_capture(file);
+    require(log.ticks.ticks() <= log.samples.size() + log.flight.size(), "ticks are counted once");
+  } catch (const capture::CaptureError& refusal) {
+    require(refusal.what()[0] != '\0', "a refusal says why");
+  }
+  return 0;
+}
