@@ -1,6 +1,6 @@
 // Command intake: what anybody may send over the network goes through the bridge's checks into the controller, which ticks on. Whatever
-// is asked, torques stay finite and within the drives' reach, there is none without an armed session, and no number of a command gets as far
-// as to make the controller's own numbers infinite.
+// is asked, torques stay finite and within the drives' reach, there is none without an armed session, and no number of a command gets as
+// far as to make the controller's own numbers infinite.
 #include <array>
 #include <cmath>
 #include <memory>
@@ -126,7 +126,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       check_tick(rig.rig, controller, out, before);
       Reply reply;
       while (mail.replies.pop(reply))
-        require(reply.code <= ReplyCode::NoModel && reply.kind <= CommandKind::Haptic && reply.mode <= Mode::Fault, "a reply that has a name");
+        require(reply.code <= ReplyCode::NoModel && reply.kind <= CommandKind::Haptic && reply.mode <= Mode::Fault,
+                "a reply that has a name");
       Event event;
       while (mail.events.pop(event)) require(!(std::isnan(event.value) || std::isnan(event.limit)), "events hold numbers");
     }

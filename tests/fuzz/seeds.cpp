@@ -1,4 +1,4 @@
-// Writes the inputs that cannot be typed: model images and captures of this version. seeds FOLDER, then ./run fuzz --minimise NAME.
+// Writes the inputs that cannot be typed: model images and captures of this version, into FOLDER/NAME of their targets.
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -6,7 +6,8 @@
 #include <iterator>
 #include <string>
 
-#include "common/capture/rig_capture.hpp"
+#include "common/capture/cdr.hpp"
+#include "common/capture/mcap_writer.hpp"
 #include "common/wire/convert.hpp"
 #include "example.hpp"
 #include "tiny_image.hpp"
@@ -17,7 +18,8 @@ namespace {
 
 void write_image(const std::filesystem::path& file, model::testing::TinyImage& tiny) {
   const model::testing::Bytes bytes = tiny.bytes();
-  std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(bytes.span().data()), static_cast<std::streamsize>(bytes.span().size()));
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.span().data()), static_cast<std::streamsize>(bytes.span().size()));
 }
 
 std::string read(const std::filesystem::path& file) {
@@ -66,8 +68,14 @@ int main(int argc, char** argv) {
       tiny.law.method = method;
       write_image(folder / target / ("method" + std::to_string(static_cast<int>(method))), tiny);
     }
-    tiny.image.needle = {.length_m = 0.1, .radius_m = 0.0007, .elements = 8, .bending_nm2 = 0.02, .axial_n = 1e5, .curvature_per_m = 0.5,
-                         .face_rad = 0.3, .tip_lateral = 0.1};
+    tiny.image.needle = {.length_m = 0.1,
+                         .radius_m = 0.0007,
+                         .elements = 8,
+                         .bending_nm2 = 0.02,
+                         .axial_n = 1e5,
+                         .curvature_per_m = 0.5,
+                         .face_rad = 0.3,
+                         .tip_lateral = 0.1};
     write_image(folder / target / "bends", tiny);
     model::testing::TinyImage planar;
     write_image(folder / target / "explicit", planar);

@@ -54,6 +54,7 @@ function(trocar_library folder)
     target_include_directories(${target} PUBLIC ${root})
     target_link_libraries(${target} PUBLIC ${ARG_DEPENDS} PRIVATE trocar_options ${ARG_PRIVATE_DEPENDS})
     if(ARG_REALTIME)
+      set_property(GLOBAL APPEND PROPERTY TROCAR_REALTIME_LIBRARIES ${target})  # tests/integration/realtime_symbols.cmake
       target_link_libraries(${target} PRIVATE trocar_realtime)
     endif()
   else()
