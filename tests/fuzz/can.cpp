@@ -31,7 +31,7 @@ void check(const hal::CanFrame& frame, hal::BusCounters& counters) {
   const std::size_t size = strnlen(line.data(), line.size());
   require(size < line.size() && size > 0 && line[size - 1] == '\n', "a log line ends in a line feed and a zero");
   const char* hash = std::strchr(line.data(), '#');
-  require(hash != nullptr && (frame.remote || size == static_cast<std::size_t>(hash - line.data()) + 2 + 2 * data),
+  require(hash != nullptr && (frame.remote || size == static_cast<std::size_t>(hash - line.data()) + 2 + std::size_t{2} * data),
           "a log line holds all of the data");
 }
 

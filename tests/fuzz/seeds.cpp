@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "common/capture/cdr.hpp"
 #include "common/capture/mcap_writer.hpp"
@@ -80,6 +81,18 @@ int main(int argc, char** argv) {
     model::testing::TinyImage planar;
     write_image(folder / target / "explicit", planar);
   }
+  std::filesystem::create_directories(folder / "cdr");
+  wire::BatchBuffer batch;
+  for (std::uint64_t tick = 1; tick <= 2; ++tick) (void)batch.push(example::sample(tick));
+  const auto write_cdr = [&](const char* name, char which, const std::vector<std::byte>& cdr) {
+    write(folder / "cdr" / name, which + std::string(reinterpret_cast<const char*>(cdr.data()), cdr.size()));
+  };
+  write_cdr("batch", 0, capture::serialise(batch.message(0)));
+  write_cdr("flight", 1, capture::serialise(batch.flight(2000)));
+  write_cdr("status", 2, capture::serialise(wire::Status{}));
+  write_cdr("event", 3, capture::serialise(wire::to_wire(Event{.tick = 3, .kind = EventKind::Homed}, "homed")));
+  write_cdr("command", 4, capture::serialise(wire::to_wire(Command{.session = 7, .kind = CommandKind::Move}, "stiff", 1, 100)));
+  write_cdr("reply", 5, capture::serialise(wire::to_wire(Reply{.session = 7, .id = 1}, "done")));
   std::filesystem::create_directories(folder / "mcap");
   write_capture(folder / "mcap" / "whole");
   // Without a checksum over the messages, so that what is changed in them is looked at; and the same cut off.
