@@ -60,27 +60,26 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[1];
-  for (const char* target : {"model_image", "needle_tick"}) {
-    std::filesystem::create_directories(folder / target);
-    model::testing::TinyImage tiny;
-    tiny.store_float32();
-    tiny.law.explicit_count = 0;
-    for (const auto method : {contact::Method::Embedded, contact::Method::Snap, contact::Method::Adapt}) {
-      tiny.law.method = method;
-      write_image(folder / target / ("method" + std::to_string(static_cast<int>(method))), tiny);
-    }
-    tiny.image.needle = {.length_m = 0.1,
-                         .radius_m = 0.0007,
-                         .elements = 8,
-                         .bending_nm2 = 0.02,
-                         .axial_n = 1e5,
-                         .curvature_per_m = 0.5,
-                         .face_rad = 0.3,
-                         .tip_lateral = 0.1};
-    write_image(folder / target / "bends", tiny);
-    model::testing::TinyImage planar;
-    write_image(folder / target / "explicit", planar);
+  std::filesystem::create_directories(folder / "model_image");
+  std::filesystem::create_directories(folder / "needle_tick");
+  model::testing::TinyImage planar;
+  write_image(folder / "model_image" / "explicit", planar);
+  model::testing::TinyImage tiny;
+  tiny.store_float32();
+  tiny.law.explicit_count = 0;
+  for (const auto method : {contact::Method::Embedded, contact::Method::Snap, contact::Method::Adapt}) {
+    tiny.law.method = method;
+    write_image(folder / "model_image" / ("method" + std::to_string(static_cast<int>(method))), tiny);
   }
+  tiny.image.needle = {.length_m = 0.1,
+                       .radius_m = 0.0007,
+                       .elements = 8,
+                       .bending_nm2 = 0.02,
+                       .axial_n = 1e5,
+                       .curvature_per_m = 0.5,
+                       .face_rad = 0.3,
+                       .tip_lateral = 0.1};
+  write_image(folder / "needle_tick" / "bends", tiny);
   std::filesystem::create_directories(folder / "cdr");
   wire::BatchBuffer batch;
   for (std::uint64_t tick = 1; tick <= 2; ++tick) (void)batch.push(example::sample(tick));
