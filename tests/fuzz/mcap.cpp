@@ -6,6 +6,14 @@
 using namespace trocar;
 using fuzz::require;
 
+namespace {
+
+void require_lines(const capture::ReadReport& report) {
+  for (const std::string& problem : report.problems) fuzz::require_line(problem);
+}
+
+}  // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::filesystem::path file = fuzz::memory_file(data, size);
   try {
@@ -17,6 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       ++messages;
       bytes += message.data.size();
     });
+    require_lines(all);
     require(messages == all.messages, "every message is counted");
     require(bytes <= size && all.lost_bytes <= size, "no more comes out than went in");
     require(all.finished == reader.finished(), "finished is finished");
@@ -34,13 +43,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         part);
     require(selected == some.messages && selected <= messages, "a part is no more than the whole");
   } catch (const capture::CaptureError& refusal) {
-    require(refusal.what()[0] != '\0', "a refusal says why");
+    fuzz::require_line(refusal.what());
   }
   try {
     const capture::RigLog log = capture::read_capture(file);
+    require_lines(log.report);
     require(log.ticks.ticks() <= log.samples.size() + log.flight.size(), "ticks are counted once");
   } catch (const capture::CaptureError& refusal) {
-    require(refusal.what()[0] != '\0', "a refusal says why");
+    fuzz::require_line(refusal.what());
   }
   return 0;
 }

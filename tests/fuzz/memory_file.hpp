@@ -20,11 +20,17 @@ inline std::filesystem::path memory_file(const std::uint8_t* data, std::size_t s
   return "/proc/self/fd/" + std::to_string(file);
 }
 
+// What is said to a person.
+inline void require_line(const std::string& message) {
+  require(!message.empty(), "a refusal says why");
+  for (const char c : message) require(c != '\n' && c != '\r' && c != '\0' && c != '\x1b', "a refusal is one line without control codes");
+}
+
 // What a reader says of a file that it refuses: one line for a person, that begins with the file.
 inline void require_message(const std::string& message, const std::filesystem::path& file) {
   require(message.starts_with(file.string() + ":") || message.starts_with(file.string() + ","), "a refusal begins with the file");
   require(message.size() > file.string().size() + 4, "a refusal says why");
-  for (const char c : message) require(c != '\n' && c != '\r' && c != '\0' && c != '\x1b', "a refusal is one line without control codes");
+  require_line(message);
 }
 
 }  // namespace trocar::fuzz
