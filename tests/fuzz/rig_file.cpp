@@ -31,7 +31,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(rig.buses.drive_node[i] >= 1 && rig.buses.drive_node[i] <= 127, "a node id of CANopen");
   }
   const rig::BusBudget budget = rig::bus_budget(rig);
-  require(budget.fits(), "an accepted rig fits its buses");
+  require(std::isfinite(budget.drives_peak_percent + budget.sensor_percent),
+          "a bus has a load");  // whether it fits, `trocar rig check` says
   if (rig.kind != rig::Kind::Twin) return 0;
 
   static const auto mail = std::make_unique<controller::Mailboxes>();
