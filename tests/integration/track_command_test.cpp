@@ -148,6 +148,37 @@ TEST_F(TrackCommand, RefusesWhatCannotBe) {
   }
 }
 
+// The camera over the simulated phantom, from the bench's process to the tracker's.
+TEST_F(TrackCommand, WatchesTheBenchInLockStep) {
+  (void)scratch.make_rig();
+  const std::string experiment = scratch.make_experiment().string();
+  Program bench(scratch, "trocar-bench", {"--experiment", experiment, "--out", path("run"), "--camera-socket", path("camera.socket")});
+  ASSERT_TRUE(bench.wait_for("camera at", answer_s)) << bench.errors();
+  Program program(scratch, "trocar",
+                  {"track", "stream:" + path("camera.socket"), "--camera", "thesis_half", "--out", path("markers.csv"), "--json"});
+  ASSERT_EQ(program.wait(100.0), 0) << program.errors();
+  ASSERT_EQ(bench.wait(answer_s), 0) << bench.errors();
+  EXPECT_NE(program.out().find("\"frames_lost\": 0, \"frames_dropped\": 0"), std::string::npos) << program.out();
+  EXPECT_NE(program.out().find("\"clock\": \"rig\""), std::string::npos) << program.out();
+  const config::Csv m = markers();
+  const config::Csv t = config::Csv::load(scratch / "run" / "markers_truth.csv", {"frame,t_s,row,col,u_px,v_px,x_m,y_m,visible"});
+  ASSERT_EQ(m.rows(), t.rows());
+  double squares = 0.0, moved = 0.0;
+  std::size_t seen = 0, wrong = 0;
+  for (std::size_t i = 0; i < m.rows(); ++i) {
+    moved = std::max(moved, std::hypot(t(i, 6) - t(i % 441, 6), t(i, 7) - t(i % 441, 7)));
+    if (m(i, 9) == 0.0) continue;
+    const double d = std::hypot(m(i, 4) - t(i, 4), m(i, 5) - t(i, 5));
+    squares += d * d;
+    wrong += d > 5.0 ? 1U : 0U;
+    ++seen;
+  }
+  EXPECT_GT(moved, 1e-3);  // the needle was in the tissue
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_GT(static_cast<double>(seen), 0.99 * static_cast<double>(m.rows()));
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(seen)), 0.05);
+}
+
 // A camera on the loopback, in another process.
 class FakeCamera : public TrackCommand {
  protected:
