@@ -10,10 +10,11 @@ namespace trocar::tracking {
 namespace {
 
 constexpr int rays = 48;
-constexpr int passes = 3;            // rays anew from the centre found; each reaches less far than the one before
-constexpr int reweightings = 4;      // in the last of them
-constexpr double oval_part = 0.015;  // of the radius: how far dots are expected to be from round, on two axes of ovality
-constexpr double tukey = 4.685;      // 95 % efficient for normal noise
+constexpr int passes = 3;                // rays anew from the centre found; each reaches less far than the one before
+constexpr int reweightings = 4;          // in the last of them
+constexpr double oval_part = 0.015;      // of the radius: how far dots are expected to be from round, on two axes of ovality
+constexpr double tukey = 4.685;          // 95 % efficient for normal noise
+constexpr double tukey_variance = 0.83;  // of a normal residual that its weights leave: (1 - 6 / c^2 + 15 / c^4) / (1 - 2 / c^2 + 3 / c^4)
 constexpr double least_scale_px = 0.03;
 constexpr float hole_px = 0.3F;                      // half-way point and integral further apart than this: something lies on the ray
 constexpr double most_deviation_px = 0.2;            // of a centre that is believed
