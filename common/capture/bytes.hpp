@@ -83,4 +83,11 @@ class ByteReader {
   bool ok_ = true;
 };
 
+// A text from a file, for a message: a terminal shall not act on what a damaged one holds.
+[[nodiscard]] inline std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+  return text;
+}
+
 }  // namespace trocar::capture

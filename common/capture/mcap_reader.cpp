@@ -302,7 +302,7 @@ bool McapReader::read_chunk(Pass& pass, std::uint64_t offset, std::span<const st
   const std::string when = " (" + seconds(chunk.start_ns) + " to " + seconds(chunk.end_ns) + ")";
   if (!chunk.compression.empty()) {
     ++report.damaged_chunks;
-    report.problems.push_back(name() + when + " is compressed with " + chunk.compression + ", which this reader does not know");
+    report.problems.push_back(name() + when + " is compressed with " + printable(chunk.compression) + ", which this reader does not know");
     return true;
   }
   const std::uint32_t crc = crc32(chunk.records);

@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "common/capture/bytes.hpp"
 #include "common/wire/convert.hpp"
 
 namespace trocar::capture {
@@ -79,8 +80,8 @@ RigLog read_capture(const std::filesystem::path& path) {
     const auto found = channel.metadata.find("protocol");
     const std::string theirs = found == channel.metadata.end() ? "of no number" : found->second;
     if (theirs == std::to_string(protocol_version)) return;
-    throw CaptureError(channel.topic + " in " + path.string() + " was recorded with protocol " + theirs + ", this program reads " +
-                       std::to_string(protocol_version) + ": use the version of trocar that recorded it");
+    throw CaptureError(printable(channel.topic) + " in " + path.string() + " was recorded with protocol " + printable(theirs) +
+                       ", this program reads " + std::to_string(protocol_version) + ": use the version of trocar that recorded it");
   };
   McapReader reader(path);
   log.report = reader.read([&](const Message& message) {
@@ -102,7 +103,7 @@ RigLog read_capture(const std::filesystem::path& path) {
         if (status->machine[0] != '\0') log.machine = {status->machine, static_cast<bool>(status->real_time), wire::loop_of(*status)};
       }
     } catch (const CdrError& error) {
-      problems.push_back(topic + " message " + std::to_string(message.sequence) + " does not decode: " + error.what());
+      problems.push_back(printable(topic) + " message " + std::to_string(message.sequence) + " does not decode: " + error.what());
     }
   });
   log.report.problems.insert(log.report.problems.end(), problems.begin(), problems.end());

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -381,10 +382,11 @@ Document Document::load(const std::filesystem::path& file) {
   if (!stream) {
     throw UserError(fmt::format("{}: cannot be opened: {}; check the permissions of the file", name, std::strerror(errno)));
   }
-  std::string content(largest_file + 1, '\0');
-  stream.read(content.data(), static_cast<std::streamsize>(content.size()));
+  std::string content;
+  std::array<char, 16384> piece;
+  while (content.size() <= largest_file && (stream.read(piece.data(), piece.size()), stream.gcount() > 0))
+    content.append(piece.data(), static_cast<std::size_t>(stream.gcount()));
   if (stream.bad()) throw UserError(fmt::format("{}: cannot be read: {}; check the disk", name, std::strerror(errno)));
-  content.resize(static_cast<std::size_t>(stream.gcount()));
   if (content.size() > largest_file) {
     throw UserError(
         fmt::format("{}: larger than {} KiB; no configuration is: check that this is the right file", name, largest_file / 1024));

@@ -245,8 +245,8 @@ bool Compliance::move(Geometry& geometry, std::uint32_t node, const Vector2& x_m
       const element::Type type = cell.count == 3 ? element::Type::Tri3 : element::Type::Quad4;
       const element::Elasticity c = element::elasticity(tissue_->model, tissue_->material[cell.material]);
       if (element::stiffness(type, tissue_->integration, corners, c, tissue_->thickness_m, stiffness) != element::Status::Ok) return false;
-      for (std::size_t i = 0; i < 2U * cell.count; ++i)
-        for (std::size_t j = 0; j < 2U * cell.count; ++j)
+      for (std::size_t i = 0; i < std::size_t{2} * cell.count; ++i)
+        for (std::size_t j = 0; j < std::size_t{2} * cell.count; ++j)
           change[2 * local(cell.node[i / 2]) + i % 2][2 * local(cell.node[j / 2]) + j % 2] +=
               sign * stiffness(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }

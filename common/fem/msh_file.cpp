@@ -23,7 +23,10 @@ class Reader {
       place += ", byte " + std::to_string(mark_);
     else
       place += ":" + std::to_string(1 + std::count(before.begin(), before.end(), '\n'));
-    throw Error(place + ": " + problem);
+    place += ": ";
+    // What a problem quotes from a damaged file may hold anything; a terminal shall not act on it.
+    for (const char c : problem) place += static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '?' : c;
+    throw Error(place);
   }
 
   bool binary{false};
@@ -34,7 +37,7 @@ class Reader {
       mark_ = at_;
       const std::size_t end = std::min(text_.find('\n', at_), text_.size());
       std::string_view found(text_.data() + at_, end - at_);
-      at_ = end + 1;
+      at_ = std::min(end + 1, text_.size());  // the last line may have no end
       while (!found.empty() && (found.back() == '\r' || found.back() == ' ')) found.remove_suffix(1);
       if (!found.empty()) return found;
     }
@@ -59,7 +62,7 @@ class Reader {
   }
   // How many items follow; more than the rest of the file could hold are refused before anything is stored.
   std::int64_t count(std::int64_t value, const char* what) const {
-    if (value < 0 || static_cast<std::uint64_t>(value) > text_.size() - std::min(at_, text_.size()))
+    if (value < 0 || static_cast<std::uint64_t>(value) > text_.size() - at_)
       fail(std::to_string(value) + " " + what + " do not fit in the rest of the file; it is damaged or was cut short");
     return value;
   }
@@ -82,7 +85,10 @@ class Reader {
     const std::size_t open = rest.find('"');
     const std::size_t close = rest.rfind('"');
     if (open == std::string_view::npos || close == open) fail("expected a name in quotes");
-    return std::string(rest.substr(open + 1, close - open - 1));
+    const std::string_view found = rest.substr(open + 1, close - open - 1);
+    for (const char c : found)
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) fail("a name holds a control character; name the group anew");
+    return std::string(found);
   }
 
  private:

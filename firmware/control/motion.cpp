@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace trocar::control {
 
@@ -19,7 +20,7 @@ PathLimits Motion::path_limits(double speed_m_s, double angular_speed_rad_s, con
   const double length = std::hypot(span_[0], span_[1]);
   const double angle = std::abs(span_[2]);
   const auto slower = [&](double linear, double angular) noexcept {
-    double value = INFINITY;
+    double value = std::numeric_limits<double>::infinity();
     if (length > 0.0) value = std::min(value, linear / length);
     if (angle > 0.0) value = std::min(value, angular / angle);
     return value;

@@ -33,6 +33,7 @@ struct DriveSetup {
 
 // No torque frame for so long while enabled, 20 ticks: the drive faults by itself.
 [[nodiscard]] constexpr std::uint16_t rpdo_timeout_ms(const rig::Rig& rig) noexcept {
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings): positive and far from 2^52; std::lround is not constexpr
   return static_cast<std::uint16_t>(20.0 * 1000.0 / rig.timing.tick_hz + 0.5);
 }
 

@@ -88,6 +88,11 @@ class AravisSource : public Source {
   }
   ~AravisSource() override {
     if (camera_ == nullptr) return;
+    if (gone_) {  // to say goodbye to it takes Aravis a dozen seconds of waiting for answers; what it holds ends with the program
+      (void)stream_.release();
+      (void)camera_.release();
+      return;
+    }
     g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
     if (!lost_.load()) arv_camera_stop_acquisition(camera_.get(), nullptr);
   }

@@ -7,7 +7,7 @@
 namespace trocar::camera {
 namespace {
 
-constexpr std::chrono::milliseconds patience{10'000};  // a simulation compiles its scene first
+constexpr std::chrono::milliseconds patience{2'000};  // it says when it serves its camera
 
 }  // namespace
 

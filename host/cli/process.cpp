@@ -29,7 +29,8 @@ std::vector<char*> argv_of(const std::string& path, const std::vector<std::strin
 }
 
 config::UserError not_started(const std::string& path, int error) {
-  return config::UserError(fmt::format("cannot start {} ({}): build it with ./run build", path, std::strerror(error)));
+  return config::UserError(
+      fmt::format("cannot start {} ({}): install the package of that name, or build it with ./run build", path, std::strerror(error)));
 }
 
 }  // namespace

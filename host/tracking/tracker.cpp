@@ -13,6 +13,7 @@ namespace trocar::tracking {
 namespace {
 
 constexpr double stray_part = 0.35;    // of a step of the grid: as far as a marker may stray from what its neighbours say
+constexpr double parted_part = 0.5;    // of a step: neighbours do not part by more
 constexpr double together_part = 0.5;  // of a step: two markers closer than this are on one dot
 constexpr double size_part = 0.2;  // by which a dot's radius may differ from what it was: half of one under a cover looks like another size
 constexpr double good_score = 0.8;
@@ -216,7 +217,54 @@ std::optional<Place> Tracker::expected(std::size_t k) const {
   return Place{track_[k].rest.u_px + sum.u_px / n, track_[k].rest.v_px + sum.v_px / n};
 }
 
+// Where tissue springs back faster than the camera looks, whole blocks of markers may agree with each other and all sit one dot further on.
+// Their border gives them away: neighbours do not part by half a step. What hangs together is kept where it is largest.
+void Tracker::keep_largest_whole() {
+  const optics::MarkerGrid& g = options_.grid;
+  const double most = parted_part * step_px_;
+  std::vector<std::size_t> whole(located_.size(), 0), queue;
+  std::size_t count = 0, largest = 0, best = 0;
+  for (std::size_t begin = 0; begin < located_.size(); ++begin) {
+    if (!located_[begin].found || whole[begin] != 0 || std::isnan(track_[begin].rest.u_px)) continue;
+    ++count;
+    whole[begin] = count;
+    queue.assign(1, begin);
+    for (std::size_t at = 0; at < queue.size(); ++at) {
+      const std::size_t k = queue[at];
+      const int row = static_cast<int>(k) / g.columns, column = static_cast<int>(k) % g.columns;
+      for (const auto& [a, b] : {std::pair{0, 1}, std::pair{1, 0}, std::pair{0, -1}, std::pair{-1, 0}}) {
+        if (row + a < 0 || row + a >= g.rows || column + b < 0 || column + b >= g.columns) continue;
+        const std::size_t n = g.index(row + a, column + b);
+        if (!located_[n].found || whole[n] != 0 || std::isnan(track_[n].rest.u_px)) continue;
+        const double du = (located_[n].u_px - track_[n].rest.u_px) - (located_[k].u_px - track_[k].rest.u_px);
+        const double dv = (located_[n].v_px - track_[n].rest.v_px) - (located_[k].v_px - track_[k].rest.v_px);
+        if (std::hypot(du, dv) > most) continue;
+        whole[n] = count;
+        queue.push_back(n);
+      }
+    }
+    if (queue.size() > largest) {
+      largest = queue.size();
+      best = count;
+    }
+  }
+  // Smaller ones that touch the largest contradict it; those apart, behind lost ones, may be right.
+  std::vector<bool> contradicts(count + 1);
+  for (std::size_t k = 0; k < located_.size(); ++k) {
+    if (whole[k] != best) continue;
+    const int row = static_cast<int>(k) / g.columns, column = static_cast<int>(k) % g.columns;
+    for (const auto& [a, b] : {std::pair{0, 1}, std::pair{1, 0}, std::pair{0, -1}, std::pair{-1, 0}}) {
+      if (row + a < 0 || row + a >= g.rows || column + b < 0 || column + b >= g.columns) continue;
+      const std::size_t n = whole[g.index(row + a, column + b)];
+      if (n != 0 && n != best) contradicts[n] = true;
+    }
+  }
+  for (std::size_t k = 0; k < located_.size(); ++k)
+    if (contradicts[whole[k]]) located_[k].found = false;
+}
+
 void Tracker::judge() {
+  keep_largest_whole();
   // The worst first, since one that strays misleads its neighbours' expectations too; each round takes one away, so there is an end.
   const double most = stray_part * step_px_;
   for (std::size_t round = 0; round < located_.size(); ++round) {
@@ -235,6 +283,7 @@ void Tracker::judge() {
     if (worst == located_.size()) break;
     located_[worst].found = false;
   }
+  keep_largest_whole();
   // Two on one dot: the one that its neighbours expect elsewhere goes, both when they expect nothing.
   const optics::MarkerGrid& g = options_.grid;
   for (int row = 0; row < g.rows; ++row) {

@@ -70,6 +70,7 @@ class Tracker {
   [[nodiscard]] std::optional<Place> expected(std::size_t k) const;
   [[nodiscard]] std::size_t found() const noexcept;
   void judge();
+  void keep_largest_whole();
   void recover(const optics::Frame& frame);
   void keep(std::uint64_t number);
 

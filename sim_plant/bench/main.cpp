@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "common/capture/rig_capture.hpp"
 #include "common/capture/samples_csv.hpp"
 #include "common/condense/compile.hpp"
+#include "common/config/new_file.hpp"
 #include "common/config/rig_file.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
@@ -23,11 +25,13 @@
 #include "common/experiment/experiment_file.hpp"
 #include "common/experiment/truth_file.hpp"
 #include "common/model/image.hpp"
+#include "common/optics/frame_stream.hpp"
 #include "common/scene/scene.hpp"
 #include "common/wire/convert.hpp"
 #include "firmware/control/force_observer.hpp"
 #include "firmware/virtual_needle/virtual_needle.hpp"
 #include "sim_plant/bench/bench.hpp"
+#include "sim_plant/camera/camera.hpp"
 #include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 
@@ -45,6 +49,7 @@ struct Options {
   std::filesystem::path out;
   std::uint64_t seed = 1;
   bool progress{};
+  std::filesystem::path camera_socket;
 };
 
 constexpr std::uint64_t session = 1;
@@ -64,6 +69,56 @@ struct Model {
   image_file::AlignedBytes bytes;
   model::Image image{};
   virtual_needle::VirtualNeedle needle;
+};
+
+// The camera over the phantom: a frame at every whole period of its own, each waited for, so that none is lost and equal seeds give equal
+// frames.
+class Eye {
+ public:
+  Eye(const Options& options, const sim_plant::PlantConfig& plant, const scene::Scene& scene, const sim_plant::Phantom& phantom)
+      : config_(plant.camera.value()),
+        surface_(phantom, scene, config_.grid),
+        camera_(config_, surface_.origin_m(), scene.needle->length_m, options.seed),
+        server_(options.camera_socket),
+        truth_(options.out / "markers_truth.csv") {
+    truth_.stream() << "frame,t_s,row,col,u_px,v_px,x_m,y_m,visible\n";
+    constexpr std::chrono::seconds patience{20};
+    fmt::print("camera at {}\n", options.camera_socket.string());
+    std::fflush(stdout);
+    if (!server_.wait_for_client(patience))
+      throw config::UserError(fmt::format("{}: nobody came to watch for {} s; start trocar track stream:{}", options.camera_socket.string(),
+                                          patience.count(), options.camera_socket.string()));
+  }
+  void look(const sim_plant::Plant& plant, std::int64_t now_ns) {
+    if (static_cast<double>(now_ns) < 1e9 * static_cast<double>(number_) / config_.rate_hz) return;
+    surface_.take(plant.phantom(), now_ns, plant.pose(), state_);
+    camera_.render(state_, number_, frame_);
+    constexpr std::chrono::seconds patience{20};
+    if (watched_ && !server_.send(frame_, patience)) {
+      watched_ = false;
+      fmt::print(stderr, "trocar-bench: whoever watched the camera is gone; the experiment goes on without\n");
+    }
+    for (int row = 0; row < config_.grid.rows; ++row) {
+      for (int column = 0; column < config_.grid.columns; ++column) {
+        const optics::MarkerTruth& m = camera_.truth()[config_.grid.index(row, column)];
+        truth_.stream() << fmt::format("{},{},{},{},{},{},{},{},{}\n", number_, 1e-9 * static_cast<double>(now_ns), row, column,
+                                       m.pixel.u_px, m.pixel.v_px, m.at.x_m, m.at.y_m, m.visible ? 1 : 0);
+      }
+    }
+    ++number_;
+  }
+  void finish() { truth_.keep(); }
+
+ private:
+  sim_plant::CameraConfig config_;
+  sim_plant::Surface surface_;
+  sim_plant::Camera camera_;
+  optics::FrameServer server_;
+  config::NewFile truth_;
+  sim_plant::SurfaceState state_{};
+  optics::Frame frame_{};
+  std::uint64_t number_{};
+  bool watched_{true};
 };
 
 int run(const Options& options) {
@@ -102,6 +157,15 @@ int run(const Options& options) {
   std::optional<experiment::TruthFile> truth_file;
   if (hand) truth_file.emplace(options.out / "truth.csv");
 
+  std::unique_ptr<Eye> eye;
+  if (!options.camera_socket.empty()) {
+    if (model || !plant.camera)
+      throw config::UserError(
+          fmt::format("--camera-socket: {}; leave it out",
+                      model ? "no tissue stands before the machine in this experiment" : "plant " + e.plant + " has no [camera]"));
+    eye = std::make_unique<Eye>(options, plant, scene, bench.plant().physics().phantom());
+  }
+
   const auto begin = std::chrono::steady_clock::now();
   std::vector<Sample> pending;
   std::int64_t next_keep_alive_ns = 0;
@@ -127,6 +191,7 @@ int run(const Options& options) {
       truth.tick = bench.sample().tick;
       truth_file->write(truth);
     }
+    if (eye) eye->look(bench.plant().physics(), bench.now_ns());
     const auto time_ns = static_cast<std::uint64_t>(bench.now_ns());
     csv.write(bench.sample());
     pending.push_back(bench.sample());
@@ -149,6 +214,8 @@ int run(const Options& options) {
   capture.close();
   csv.finish();
   if (truth_file) truth_file->finish();
+  if (eye) eye->finish();
+  eye.reset();
 
   experiment::Run result;
   result.experiment = e.name;
@@ -187,6 +254,8 @@ int main(int argc, char** argv) {
   app.add_option("--hand", options.hand, "who holds the handle, instead of the experiment's: hand name, or path of its TOML file");
   app.add_option("--out", options.out, "folder for the results")->required();
   app.add_option("--seed", options.seed, "of all noise")->capture_default_str();
+  app.add_option("--camera-socket", options.camera_socket,
+                 "socket on which the camera over the phantom is served (trocar track stream:SOCKET); waits for who watches");
   app.add_flag("--progress", options.progress, "progress for a parent program, on stderr");
   try {
     app.parse(argc, argv);

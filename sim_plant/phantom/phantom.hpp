@@ -33,6 +33,7 @@ class Phantom {
   [[nodiscard]] const Vector3& base_wrench() const noexcept { return wrench_; }
   [[nodiscard]] bool empty() const noexcept { return insertion_ == nullptr; }                   // no scene
   [[nodiscard]] const insertion::Insertion& insertion() const noexcept { return *insertion_; }  // with a scene only
+  [[nodiscard]] const model::Tissue& tissue() const noexcept { return image_.tissue; }          // likewise
   [[nodiscard]] std::size_t contacts() const noexcept { return empty() ? 0 : insertion_->contacts(); }
 
   struct Counters {  // since construction

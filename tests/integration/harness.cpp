@@ -128,8 +128,9 @@ std::filesystem::path Scratch::make_experiment(const Edits& edits) const {
 
 Program::Program(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments) {
   static int number = 0;
-  out_ = scratch / (name + std::to_string(++number) + ".stdout");
-  errors_ = scratch / (name + std::to_string(number) + ".stderr");
+  const std::string stem = std::filesystem::path(name).filename().string();
+  out_ = scratch / (stem + std::to_string(++number) + ".stdout");
+  errors_ = scratch / (stem + std::to_string(number) + ".stderr");
   const std::string path = (programs / name).string();
   std::vector<char*> argv{const_cast<char*>(path.c_str())};
   for (const auto& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));

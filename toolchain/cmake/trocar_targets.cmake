@@ -5,6 +5,7 @@
 
 set(TROCAR_MARCH "" CACHE STRING "value for -march; empty leaves the compiler's default")
 set(TROCAR_SANITIZE "" CACHE STRING "sanitizers, comma separated; empty for none")
+set(TROCAR_FUZZ OFF CACHE BOOL "instrument for libFuzzer (clang only): tests/fuzz")
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -30,6 +31,10 @@ if(TROCAR_SANITIZE)
   target_link_options(trocar_options INTERFACE -fsanitize=${TROCAR_SANITIZE})
 endif()
 
+if(TROCAR_FUZZ)
+  target_compile_options(trocar_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
 # Real-time code: neither exceptions nor run-time type information exist there.
 add_library(trocar_realtime INTERFACE)
 target_compile_options(trocar_realtime INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti>)
@@ -49,6 +54,7 @@ function(trocar_library folder)
     target_include_directories(${target} PUBLIC ${root})
     target_link_libraries(${target} PUBLIC ${ARG_DEPENDS} PRIVATE trocar_options ${ARG_PRIVATE_DEPENDS})
     if(ARG_REALTIME)
+      set_property(GLOBAL APPEND PROPERTY TROCAR_REALTIME_LIBRARIES ${target})  # tests/integration/realtime_symbols.cmake
       target_link_libraries(${target} PRIVATE trocar_realtime)
     endif()
   else()

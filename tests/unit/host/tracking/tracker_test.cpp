@@ -114,6 +114,33 @@ TEST(Tracker, CoveredMarkersAreFlaggedAndComeBackAsThemselves) {
   }
 }
 
+TEST(Tracker, ABlockThatSpringsBackIsNotTakenForItsNeighbours) {
+  // Dragged by up to a step and a half of the grid, then back within one frame, as when the needle leaves the tissue.
+  Film film(testing::small_camera(), testing::small_grid(), optics::clean_appearance(), {optics::MotionKind::Insertion, 0.012, 0.02},
+            2.37e-4);
+  Tracker tracker = tracker_for(film);
+  ASSERT_EQ(tracker.start(film.frame(0)), "");
+  Errors e;
+  for (int k = 1; k <= 60; ++k) {
+    tracker.update(film.frame(k));
+    testing::add(e, tracker.markers(), film.truth(), 4.0);
+  }
+  double most = 0.0;
+  const std::vector<optics::MarkerTruth> dragged(film.truth().begin(), film.truth().end());
+  for (int k = 61; k < 70; ++k) {
+    optics::Frame frame = film.frame(0);
+    frame.number = static_cast<std::uint64_t>(k);
+    for (std::size_t i = 0; i < dragged.size(); ++i)
+      most = std::max(most,
+                      std::hypot(dragged[i].pixel.u_px - film.truth()[i].pixel.u_px, dragged[i].pixel.v_px - film.truth()[i].pixel.v_px));
+    tracker.update(frame);
+    testing::add(e, tracker.markers(), film.truth(), 4.0);
+  }
+  EXPECT_GT(most, 20.0);  // more than half of the 34 px from dot to dot
+  EXPECT_EQ(e.wrong, 0u);
+  EXPECT_GE(tracker.valid(), film.grid().markers() - 2);
+}
+
 TEST(Tracker, FramesMayBeMissing) {
   Film film = testing::small_film(optics::MotionKind::Shear);
   Tracker tracker = tracker_for(film);
