@@ -10,11 +10,11 @@
 
 #include "common/capture/rig_capture.hpp"
 #include "common/config/csv.hpp"
-#include "common/config/document.hpp"
 #include "common/config/new_file.hpp"
 #include "common/config/quote.hpp"
 #include "common/config/user_error.hpp"
 #include "common/optics/camera_file.hpp"
+#include "common/optics/pose_file.hpp"
 #include "host/camera/registration.hpp"
 
 namespace trocar::camera {
@@ -68,14 +68,6 @@ std::vector<ToolPose> read_poses(const std::filesystem::path& file) {
   return poses;
 }
 
-optics::Pose read_pose(const std::filesystem::path& file) {
-  const config::Document document = config::Document::load(file);
-  optics::Pose pose;
-  pose.rotation_rad = document.root().numbers<3>("rotation_rad", {-10.0, 10.0}, "axis times angle of the plane in the camera's frame");
-  pose.translation_m = document.root().numbers<3>("translation_m", {-1e4, 1e4}, "the phantom's first marker in the camera's frame");
-  return pose;
-}
-
 std::string vector_of(const std::array<double, 3>& v) { return fmt::format("[{}]", fmt::join(v, ", ")); }
 
 }  // namespace
@@ -85,7 +77,7 @@ int run_register(const RegisterOptions& options) {
   const Marks marks = read_marks(options.marks);
   const std::vector<ToolPose> poses = read_poses(options.capture);
   std::optional<optics::Pose> phantom;
-  if (!options.phantom.empty()) phantom = read_pose(options.phantom);
+  if (!options.phantom.empty()) phantom = optics::read_pose(options.phantom);
   RegistrationOptions how{{}, options.delay_s, options.known_delay};
   if (!options.mark_m.empty() && options.mark_m.size() != 2 * marks.place.size())
     throw config::UserError(

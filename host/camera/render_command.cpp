@@ -12,6 +12,7 @@
 #include "common/config/quote.hpp"
 #include "common/config/share.hpp"
 #include "common/config/user_error.hpp"
+#include "common/optics/pose_file.hpp"
 #include "host/camera/new_folder.hpp"
 
 namespace trocar::camera {
@@ -74,9 +75,8 @@ int run_render(const RenderOptions& options, const std::atomic<bool>& stop) {
     }
   }
   if (show) fmt::print(stderr, "\r\x1b[K");
-  std::ofstream(folder.part() / "pose.toml") << fmt::format(
-      "# The phantom's plane in the camera's frame.\nrotation_rad = [{}]\ntranslation_m = [{}]\n", fmt::join(pose.rotation_rad, ", "),
-      fmt::join(pose.translation_m, ", "));
+  std::ofstream pose_file(folder.part() / "pose.toml", std::ios::binary);
+  optics::write_pose(pose_file, pose);
   constexpr const char* formats[] = {"mono", "bayer", "rgb"};
   std::ofstream(folder.part() / "render.toml") << fmt::format(
       "camera = {}\nsetting = \"{}\"\nmotion = \"{}\"\ndisplacement_m = {}\nspeed_m_s = {}\nframes = {}\nrate_hz = {}\nrows = {}\ncolumns "
@@ -86,7 +86,8 @@ int run_render(const RenderOptions& options, const std::atomic<bool>& stop) {
       options.frames, options.rate_hz, options.grid.rows, options.grid.columns, options.grid.spacing_m, options.grid.diameter_m,
       options.m_per_px, options.tilt_rad, formats[static_cast<std::size_t>(options.appearance.format)], options.appearance.exposure_s,
       options.seed);
-  if (!truth.flush()) throw config::UserError(fmt::format("{}: cannot be written: is the disk full?", options.out.string()));
+  if (!truth.flush() || !pose_file.flush())
+    throw config::UserError(fmt::format("{}: cannot be written: is the disk full?", options.out.string()));
   folder.keep();
   if (hidden > 0)
     fmt::print(stderr, "trocar: {} of {} dots are not wholly within their frames\n", hidden,

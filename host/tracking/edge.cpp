@@ -15,6 +15,7 @@ constexpr int reweightings = 4;          // in the last of them
 constexpr double oval_part = 0.015;      // of the radius: how far dots are expected to be from round, on two axes of ovality
 constexpr double tukey = 4.685;          // 95 % efficient for normal noise
 constexpr double tukey_variance = 0.83;  // of a normal residual that its weights leave: (1 - 6 / c^2 + 15 / c^4) / (1 - 2 / c^2 + 3 / c^4)
+constexpr int most_reach_px = 32;        // along a ray, to either side of the edge
 constexpr double least_scale_px = 0.03;
 constexpr float hole_px = 0.3F;                      // half-way point and integral further apart than this: something lies on the ray
 constexpr double most_deviation_px = 0.2;            // of a centre that is believed
@@ -105,7 +106,7 @@ void find_edges(const Window& window, double u, double v, double radius, double 
   const int samples = 2 * static_cast<int>(std::ceil(reach)) + 1;
   const auto first = static_cast<float>(radius - 0.5 * (samples - 1));
   edge.assign(rays, std::nanf(""));
-  std::array<float, 64> level{};
+  std::array<float, 2 * most_reach_px + 1> level{};
   for (std::size_t k = 0; k < rays; ++k) {
     const auto c = static_cast<float>(direction.cosine[k]), s = static_cast<float>(direction.sine[k]);
     const float u0 = static_cast<float>(u - window.left), v0 = static_cast<float>(v - window.top);
@@ -238,7 +239,7 @@ Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Pla
 
   double radius = std::clamp(std::sqrt(blob.area_px / std::numbers::pi), 0.7 * radius_px, 1.4 * radius_px);
   const double least_reach = std::min(4.0, 0.65 * radius_px);
-  double reach = std::max(least_reach, 0.45 * radius_px);
+  double reach = std::clamp(0.45 * radius_px, least_reach, static_cast<double>(most_reach_px));
   Outline outline;
   for (int k = 0; k < passes; ++k) {
     find_edges(scratch.window, centre.u_px, centre.v_px, radius, reach, 0.35F * (levels.bright - levels.dark), k == 0 ? 9.0F : hole_px,

@@ -77,7 +77,7 @@ struct Place {
 [[nodiscard]] Located locate_by_correlation(const optics::Frame& frame, const Gains& gains, const Place& start, const Disc& disc,
                                             int neighbourhood_px, Scratch& scratch);
 
-// Finds a dot whose centre is within some 8 px, or 0.7 of the radius, of the start.
+// Finds a dot of a radius of 3.5 px or more whose centre is within some 8 px, or 0.7 of the radius, of the start.
 [[nodiscard]] Located locate_by_edge(const optics::Frame& frame, const Gains& gains, const Place& start, double radius_px,
                                      Scratch& scratch);
 

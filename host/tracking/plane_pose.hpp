@@ -1,9 +1,7 @@
 // Where the marked plane stands before the camera, from the markers of one frame and the grid that they were painted on.
 #pragma once
 
-#include <filesystem>
 #include <optional>
-#include <ostream>
 #include <span>
 
 #include "common/optics/marker_grid.hpp"
@@ -20,9 +18,5 @@ struct PlaneFit {
 // Least squares over all valid markers; the start from the homography of the rectified rays (Collins and Bartoli 2014, by OpenCV). Nothing
 // with fewer than four, or when they lie on a line.
 [[nodiscard]] std::optional<PlaneFit> fit_plane(const optics::Lens& lens, const optics::MarkerGrid& grid, std::span<const Marker> markers);
-
-// TOML: rotation_rad = [..], translation_m = [..] (optics/plane.hpp). Throws config::UserError.
-[[nodiscard]] optics::Pose read_pose(const std::filesystem::path& file);
-void write_pose(std::ostream& stream, const optics::Pose& pose);
 
 }  // namespace trocar::tracking

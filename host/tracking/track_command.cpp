@@ -18,6 +18,7 @@
 #include "common/config/new_file.hpp"
 #include "common/config/quote.hpp"
 #include "common/config/user_error.hpp"
+#include "common/optics/pose_file.hpp"
 #include "host/camera/queue.hpp"
 #include "host/tracking/picture.hpp"
 #include "host/tracking/plane_pose.hpp"
@@ -125,7 +126,7 @@ class Run {
  public:
   Run(const TrackOptions& options, const Listener& listener)
       : options_(options), listener_(listener), camera_(optics::read_camera(options.camera)), tracker_(options.tracker) {
-    if (!options.pose.empty()) view_.emplace(camera_.lens, read_pose(options.pose));
+    if (!options.pose.empty()) view_.emplace(camera_.lens, optics::read_pose(options.pose));
     source_ = camera::open_source(options.source, options.source_options);
     // A camera does not wait. Files and the simulation do.
     if (source_->clock() == camera::Clock::Camera) source_ = std::make_unique<camera::QueuedSource>(std::move(source_), queue_depth);
@@ -209,7 +210,7 @@ class Run {
                                            {options_.covariance, "frame,row,col,xx_m2,xy_m2,yy_m2\n"}});
     if (!options_.pose_out.empty()) {
       config::NewFile file(options_.pose_out);
-      write_pose(file.stream(), view_->pose());
+      optics::write_pose(file.stream(), view_->pose());
       file.keep();
     }
     first_ns_ = frame.time_ns;

@@ -146,6 +146,24 @@ TEST(Edge, CovarianceIsNeverTooSmallAndRightWhereNoiseRules) {
   EXPECT_LT(stated / scatter, 2.0);
 }
 
+TEST(Edge, FindsDotsOfAnySize) {
+  for (const double radius : {3.5, 5.0, 40.0, 90.0, 180.0}) {
+    const int side = static_cast<int>(4.0 * radius) + 40;
+    optics::Frame frame{0, 0, side, side, optics::PixelFormat::Mono8, {}};
+    const double u = 0.5 * side + 0.3, v = 0.5 * side - 0.4;
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x)
+        frame.pixels.push_back(
+            static_cast<std::uint8_t>(std::lround(200.0 - 160.0 * std::clamp(radius + 0.5 - std::hypot(x - u, y - v), 0.0, 1.0))));
+    Scratch scratch;
+    const Located l = locate_by_edge(frame, white_balance(frame), {u + 1.0, v - 1.0}, radius, scratch);
+    ASSERT_TRUE(l.found) << radius;
+    EXPECT_NEAR(l.u_px, u, 0.1) << radius;
+    EXPECT_NEAR(l.v_px, v, 0.1) << radius;
+    EXPECT_NEAR(l.radius_px, radius, 0.3) << radius;
+  }
+}
+
 TEST(Locate, FindsNothingWhereNothingIs) {
   optics::Frame frame{0, 0, 200, 150, optics::PixelFormat::Mono8, std::vector<std::uint8_t>(200 * 150, 0)};
   Scratch scratch;
