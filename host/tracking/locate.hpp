@@ -11,9 +11,10 @@
 // (I_out - I) / (I_out - I_in) along it, which noise, blur and uneven light leave in place. A ray on which half of the step is passed
 // elsewhere than at e has something on it, such as a hole, and is left out. An outline through the e by least squares with Tukey's
 // biweight, so that holes, a shadow's edge and dirt count for nothing:
-//   e(a) = r + dx cos a + dy sin a + p cos 2a + q sin 2a     p, q: oval by lens, perspective, strain; 0 expected, as far as the rays do not
-//   say covariance: s^2 (J^T W J)^-1, s^2 from the weighted residuals: noise, and dots that are not oval. What moves a dot's image as a
-//   whole (its centroid against its centre, by lens and perspective: 0.01 px in the thesis's geometry) is not in it
+//   e(a) = r + dx cos a + dy sin a + p cos 2a + q sin 2a
+//   p, q: oval by lens, perspective and strain; drawn towards 0 as far as the rays do not say
+//   covariance: s^2 (J^T W J)^-1, s^2 from the weighted residuals: noise, and dots that are not oval. What moves a dot's
+//   image as a whole (its centroid against its centre, by lens and perspective: 0.01 px in the thesis's geometry) is not in it
 #pragma once
 
 #include <array>

@@ -84,6 +84,15 @@ void append(Files& files, const optics::MarkerGrid& grid, const TrackedFrame& f,
 
 // Places of all markers between four corners, straight lines of the plane kept straight: in rectified pixels.
 std::vector<Place> between_corners(const std::vector<double>& corner, const optics::MarkerGrid& grid, const optics::Lens& lens) {
+  double area = 0.0;  // twice, negative when they go round against the clock as one sees the image
+  for (std::size_t k = 0; k < 8; k += 2) {
+    const std::size_t n = (k + 2) % 8;
+    area += corner[k] * corner[n + 1] - corner[n] * corner[k + 1];
+  }
+  if (!(area < 0.0))
+    throw config::UserError(
+        "--corners: they go round with the clock, so that the phantom would be seen from behind; give row 0 column 0, row 0 last column, "
+        "both last, last row column 0");
   const optics::Rectifier rectifier(lens);
   const auto last_column = static_cast<float>(grid.columns - 1), last_row = static_cast<float>(grid.rows - 1);
   const std::vector<cv::Point2f> cells{{0.0F, 0.0F}, {last_column, 0.0F}, {last_column, last_row}, {0.0F, last_row}};

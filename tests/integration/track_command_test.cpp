@@ -130,7 +130,8 @@ TEST_F(TrackCommand, RefusesWhatCannotBe) {
   refuses(track({path("small.pgm")}), {"64 x 48 px", "686 x 514"});
   refuses(track({path("none.png")}), {"none.png: there is no such file"});
   refuses(track({frame}, {"--pose", path("camera.toml")}), {"rotation_rad"});
-  refuses(track({frame}, {"--corners", "10,10", "600,10", "600,500", "10,500"}), {"markers were found where the grid should be"});
+  refuses(track({frame}, {"--corners", "10,500", "600,500", "600,10", "10,10"}), {"markers were found where the grid should be"});
+  refuses(track({frame}, {"--corners", "10,10", "600,10", "600,500", "10,500"}), {"--corners", "seen from behind", "row 0 column 0"});
   refuses(track({"stream:" + path("socket/none")}), {"no camera is served there"});
   expect_refusal(scratch, "trocar", {"camera", "render", "--out", path("frames")}, {"frames: is there already"});
   std::string folding = small_camera;
