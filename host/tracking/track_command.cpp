@@ -12,6 +12,7 @@
 #include <fstream>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -309,6 +310,9 @@ int run_track(const TrackOptions& options, const Listener& listener, const std::
   if (!options.covariance.empty() && options.covariance == options.out)
     throw config::UserError(
         fmt::format("{}: markers and covariances cannot be one file; give --covariance another name", options.out.string()));
+  if (!options.picture.empty() && !cv::haveImageWriter(options.picture.string()))
+    throw config::UserError(
+        fmt::format("--picture {}: no kind of image that can be written here; give a name that ends in .png", options.picture.string()));
   cv::setNumThreads(std::max(1, options.tracker.threads));
   return Run(options, listener).run(stop);
 }

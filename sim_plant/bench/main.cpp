@@ -147,24 +147,27 @@ int run(const Options& options) {
   sim_plant::Bench bench(rig, plant, model ? std::nullopt : std::optional(scene), options.seed, model ? &model->needle : nullptr);
   if (hand) bench.give_to(&*hand);
 
+  const bool watched = !options.camera_socket.empty();
+  if (watched && (model || !plant.camera))
+    throw config::UserError(fmt::format("--camera-socket: {}; leave it out", model
+                                                                                 ? "no tissue stands before the machine in this experiment"
+                                                                                 : "plant " + e.plant + " has no [camera]"));
   std::error_code error;
-  std::filesystem::create_directories(options.out, error);
+  const bool made = std::filesystem::create_directories(options.out, error);
   if (error)
     throw config::UserError(
         fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
+  std::unique_ptr<Eye> eye;
+  try {
+    if (watched) eye = std::make_unique<Eye>(options, plant, scene, bench.plant().physics().phantom());
+  } catch (...) {
+    if (made) std::filesystem::remove(options.out, error);  // still empty: nothing was run
+    throw;
+  }
   capture::RigCaptureWriter capture(options.out / "capture.mcap");
   capture::SamplesCsv csv(options.out / "samples.csv");
   std::optional<experiment::TruthFile> truth_file;
   if (hand) truth_file.emplace(options.out / "truth.csv");
-
-  std::unique_ptr<Eye> eye;
-  if (!options.camera_socket.empty()) {
-    if (model || !plant.camera)
-      throw config::UserError(
-          fmt::format("--camera-socket: {}; leave it out",
-                      model ? "no tissue stands before the machine in this experiment" : "plant " + e.plant + " has no [camera]"));
-    eye = std::make_unique<Eye>(options, plant, scene, bench.plant().physics().phantom());
-  }
 
   const auto begin = std::chrono::steady_clock::now();
   std::vector<Sample> pending;

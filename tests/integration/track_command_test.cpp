@@ -133,6 +133,12 @@ TEST_F(TrackCommand, RefusesWhatCannotBe) {
   refuses(track({frame}, {"--corners", "10,500", "600,500", "600,10", "10,10"}), {"markers were found where the grid should be"});
   refuses(track({frame}, {"--corners", "10,10", "600,10", "600,500", "10,500"}), {"--corners", "seen from behind", "row 0 column 0"});
   refuses(track({"stream:" + path("socket/none")}), {"no camera is served there"});
+  refuses(track({frame}, {"--picture", path("markers.xyz")}), {"markers.xyz: no kind of image", ".png"});
+  expect_refusal(scratch, "trocar-bench", {"--out", path("run"), "--camera-socket", path("nowhere/socket")},
+                 {"no socket can be made there"});
+  expect_refusal(scratch, "trocar-bench", {"--experiment", "haptic", "--out", path("run"), "--camera-socket", path("socket")},
+                 {"no tissue"});
+  EXPECT_FALSE(std::filesystem::exists(scratch / "run"));
   expect_refusal(scratch, "trocar", {"camera", "render", "--out", path("frames")}, {"frames: is there already"});
   std::string folding = small_camera;
   folding.replace(folding.find("-0.268"), 6, "-2.268");

@@ -22,8 +22,8 @@ using Status = FrameClient::Status;
 class FrameStream : public ::testing::Test {
  protected:
   FrameStream() {
-    char name[] = "/tmp/trocar-frames-XXXXXX";
-    folder_ = ::mkdtemp(name);
+    std::string name = (std::filesystem::temp_directory_path() / "trocar-frames-XXXXXX").string();  // mkdtemp fills in the Xs
+    folder_ = ::mkdtemp(name.data());
     socket_ = folder_ / "camera";
   }
   ~FrameStream() override { std::filesystem::remove_all(folder_); }

@@ -22,8 +22,8 @@ using Status = Source::Status;
 class Sources : public ::testing::Test {
  protected:
   Sources() {
-    char name[] = "/tmp/trocar-sources-XXXXXX";
-    folder_ = ::mkdtemp(name);
+    std::string name = (std::filesystem::temp_directory_path() / "trocar-sources-XXXXXX").string();  // mkdtemp fills in the Xs
+    folder_ = ::mkdtemp(name.data());
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   }
   ~Sources() override { std::filesystem::remove_all(folder_); }
