@@ -7,6 +7,7 @@
 #include <csignal>
 #include <opencv2/core/utils/logger.hpp>
 #include <optional>
+#include <string_view>
 
 #include "common/config/share.hpp"
 #include "host/camera/calibrate_command.hpp"
@@ -52,6 +53,8 @@ int main(int argc, char** argv) {
       "cameras: calibrate one, and undo its distortion\nExample: trocar camera calibrate left*.jpg --board 9x6 --square-m 0.025 --out "
       "camera.toml",
       "trocar camera"};
+  // Typed as `trocar track`, and shown so.
+  if (argc > 1 && std::string_view(argv[1]) == "track") app.name("trocar");
   app.require_subcommand(1);
   int code = 0;
 
