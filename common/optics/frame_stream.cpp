@@ -18,8 +18,15 @@
 namespace trocar::optics {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Timer = std::chrono::steady_clock;
 using std::chrono::milliseconds;
+
+constexpr std::array<char, 8> greeting_magic{'t', 'r', 'c', 'a', 'm', 'e', 'r', '1'};
+struct Greeting {
+  std::array<char, 8> magic{};
+  std::uint32_t clock{}, reserved{};
+};
+static_assert(sizeof(Greeting) == 16);
 
 constexpr std::array<char, 8> magic{'t', 'r', 'f', 'r', 'a', 'm', 'e', '1'};
 struct Head {
@@ -41,12 +48,12 @@ sockaddr_un address_of(const std::filesystem::path& path) {
   return address;
 }
 
-int remaining_ms(Clock::time_point end) {
-  const auto left = std::chrono::duration_cast<milliseconds>(end - Clock::now()).count();
+int remaining_ms(Timer::time_point end) {
+  const auto left = std::chrono::duration_cast<milliseconds>(end - Timer::now()).count();
   return static_cast<int>(std::clamp<std::int64_t>(left, 0, 600'000));
 }
 
-bool ready(int fd, short events, Clock::time_point end) {
+bool ready(int fd, short events, Timer::time_point end) {
   pollfd p{fd, events, 0};
   int got = 0;
   do got = ::poll(&p, 1, remaining_ms(end));
@@ -58,8 +65,21 @@ bool connects(const sockaddr_un& address, int fd) {
   return ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
+// As much as comes until then.
+std::size_t read_some(int fd, void* into, std::size_t size, Timer::time_point end) {
+  std::size_t have = 0;
+  while (have < size) {
+    const ssize_t n = ::recv(fd, static_cast<char*>(into) + have, size - have, MSG_DONTWAIT);
+    if (n > 0)
+      have += static_cast<std::size_t>(n);
+    else if (n == 0 || (errno != EAGAIN && errno != EINTR) || !ready(fd, POLLIN, end))
+      break;
+  }
+  return have;
+}
+
 // All of it, or false.
-bool write_all(int fd, const void* data, std::size_t size, Clock::time_point end) {
+bool write_all(int fd, const void* data, std::size_t size, Timer::time_point end) {
   const auto* at = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t n = ::send(fd, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -67,7 +87,7 @@ bool write_all(int fd, const void* data, std::size_t size, Clock::time_point end
       at += n;
       size -= static_cast<std::size_t>(n);
     } else if (errno == EAGAIN || errno == EINTR) {
-      if (Clock::now() >= end || !ready(fd, POLLOUT, end)) return false;
+      if (Timer::now() >= end || !ready(fd, POLLOUT, end)) return false;
     } else {
       return false;
     }
@@ -77,7 +97,7 @@ bool write_all(int fd, const void* data, std::size_t size, Clock::time_point end
 
 }  // namespace
 
-FrameServer::FrameServer(std::filesystem::path path) : path_(std::move(path)) {
+FrameServer::FrameServer(std::filesystem::path path, Clock clock) : path_(std::move(path)), clock_(clock) {
   const sockaddr_un address = address_of(path_);
   const auto refuse = [this](const std::string& why) { throw config::UserError(fmt::format("{}: {}", path_.string(), why)); };
   struct stat there {};
@@ -108,9 +128,14 @@ FrameServer::~FrameServer() {
 
 bool FrameServer::wait_for_client(milliseconds timeout) {
   if (client_ >= 0) return true;
-  if (!ready(listener_, POLLIN, Clock::now() + timeout)) return false;
+  if (!ready(listener_, POLLIN, Timer::now() + timeout)) return false;
   client_ = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
-  return client_ >= 0;
+  if (client_ < 0) return false;
+  const Greeting greeting{greeting_magic, static_cast<std::uint32_t>(clock_), 0};
+  if (write_all(client_, &greeting, sizeof greeting, Timer::now())) return true;  // a new socket has room for it
+  ::close(client_);
+  client_ = -1;
+  return false;
 }
 
 bool FrameServer::send(const Frame& frame, milliseconds timeout) {
@@ -122,7 +147,7 @@ bool FrameServer::send(const Frame& frame, milliseconds timeout) {
                   static_cast<std::uint32_t>(frame.height_px),
                   static_cast<std::uint32_t>(frame.format),
                   static_cast<std::uint32_t>(frame.pixels.size())};
-  const auto end = Clock::now() + timeout;
+  const auto end = Timer::now() + timeout;
   if (write_all(client_, &head, sizeof head, end) && write_all(client_, frame.pixels.data(), frame.pixels.size(), end)) {
     ++sent_;
     return true;
@@ -134,24 +159,35 @@ bool FrameServer::send(const Frame& frame, milliseconds timeout) {
 
 FrameClient::FrameClient(std::filesystem::path path, milliseconds timeout) {
   const sockaddr_un address = address_of(path);
-  const auto end = Clock::now() + timeout;
+  const auto end = Timer::now() + timeout;
   while (true) {
     socket_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connects(address, socket_)) break;
     const int error = errno;
     ::close(socket_);
-    if (Clock::now() >= end)
+    if (Timer::now() >= end)
       throw config::UserError(fmt::format("{}: no camera is served there ({}); start the simulation first, with --camera-socket {}",
                                           path.string(), std::strerror(error), path.string()));
     std::this_thread::sleep_for(milliseconds(20));
   }
+  Greeting greeting;
+  const std::size_t have = read_some(socket_, &greeting, sizeof greeting, end);
+  const bool known = greeting.magic == greeting_magic && greeting.clock <= static_cast<std::uint32_t>(Clock::Rate);
+  if (have < sizeof greeting || !known) {
+    ::close(socket_);
+    throw config::UserError(fmt::format("{}: {}", path.string(),
+                                        have < sizeof greeting
+                                            ? "the camera there does not greet: another program watches it, or it hangs; end that one first"
+                                            : "what is served there is no camera of this version; use programs of one build"));
+  }
+  clock_ = static_cast<Clock>(greeting.clock);
   head_.resize(sizeof(Head));
 }
 
 FrameClient::~FrameClient() { ::close(socket_); }
 
 FrameClient::Status FrameClient::receive(Frame& frame, milliseconds timeout) {
-  const auto end = Clock::now() + timeout;
+  const auto end = Timer::now() + timeout;
   while (true) {
     const bool in_head = have_ < sizeof(Head);
     const std::size_t wanted = in_head ? sizeof(Head) - have_ : sizeof(Head) + pixels_.size() - have_;
@@ -172,7 +208,11 @@ FrameClient::Status FrameClient::receive(Frame& frame, milliseconds timeout) {
                          head.height_px > 0 && head.width_px <= largest_side_px && head.height_px <= largest_side_px;
       const auto format = static_cast<PixelFormat>(head.format);
       if (!known || head.bytes != std::uint64_t{head.width_px} * head.height_px * channels(format)) return Status::Foreign;
-      next_ = {head.number, head.time_ns, static_cast<int>(head.width_px), static_cast<int>(head.height_px), format, {}};
+      next_.number = head.number;
+      next_.time_ns = head.time_ns;
+      next_.width_px = static_cast<int>(head.width_px);
+      next_.height_px = static_cast<int>(head.height_px);
+      next_.format = format;
       pixels_.resize(head.bytes);
     }
     if (have_ < sizeof(Head) || have_ < sizeof(Head) + pixels_.size()) continue;
@@ -180,6 +220,8 @@ FrameClient::Status FrameClient::receive(Frame& frame, milliseconds timeout) {
     std::swap(frame.pixels, pixels_);  // the caller's storage serves the next frame
     frame.number = next_.number;
     frame.time_ns = next_.time_ns;
+    frame.time_uncertainty_ns = 0;
+    frame.arrived_ns = std::chrono::nanoseconds(Timer::now().time_since_epoch()).count();
     frame.width_px = next_.width_px;
     frame.height_px = next_.height_px;
     frame.format = next_.format;

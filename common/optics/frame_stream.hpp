@@ -1,6 +1,7 @@
 // Frames from one process to another on the same machine, over a Unix-domain socket: how the simulated camera is plugged in.
-// A frame on the wire: 8 bytes "trframe1", then little endian u64 number, i64 time_ns, u32 width_px, u32 height_px, u32 format, u32 bytes,
-// then the pixels. The server goes on without a client; a client that joins later gets what comes from then on.
+// To whoever connects: 8 bytes "trcamer1", then little endian u32 clock (optics::Clock) and u32 0. Then frames: 8 bytes "trframe1", u64
+// number, i64 time_ns, u32 width_px, u32 height_px, u32 format, u32 bytes, then the pixels. The server goes on without a client; a client
+// that joins later gets what comes from then on.
 #pragma once
 
 #include <chrono>
@@ -20,7 +21,7 @@ class FrameServer {
  public:
   // Listens; the socket is the user's alone (0600), and removed at the end. One that a dead server left is replaced. Throws
   // config::UserError: a name that is too long or cannot be made, somebody else listening there.
-  explicit FrameServer(std::filesystem::path path);
+  FrameServer(std::filesystem::path path, Clock clock);
   ~FrameServer();
   FrameServer(const FrameServer&) = delete;
   FrameServer& operator=(const FrameServer&) = delete;
@@ -34,6 +35,7 @@ class FrameServer {
 
  private:
   std::filesystem::path path_;
+  Clock clock_;
   int listener_{-1}, client_{-1};
   std::uint64_t sent_{};
 };
@@ -48,16 +50,19 @@ class FrameClient {
     Foreign,  // what came is no frame of this version
   };
 
-  // Connects, waiting for the server for at most `timeout`. Throws config::UserError when there is none.
+  // Connects, waiting for the server and its greeting for at most `timeout`. Throws config::UserError when there is none, or another
+  // watcher.
   FrameClient(std::filesystem::path path, std::chrono::milliseconds timeout);
   ~FrameClient();
   FrameClient(const FrameClient&) = delete;
   FrameClient& operator=(const FrameClient&) = delete;
 
   [[nodiscard]] Status receive(Frame& frame, std::chrono::milliseconds timeout);
+  [[nodiscard]] Clock clock() const noexcept { return clock_; }
 
  private:
   int socket_{-1};
+  Clock clock_{};
   std::vector<std::byte> head_{};
   std::vector<std::uint8_t> pixels_{};
   std::size_t have_{};  // bytes of the head, then of the pixels

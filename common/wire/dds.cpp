@@ -122,9 +122,9 @@ constexpr std::size_t batch = 64;
 }  // namespace
 
 const dds_topic_descriptor_t& descriptor_of(const Topic& topic) {
-  const std::array<const dds_topic_descriptor_t*, topics.size()> descriptors{&trocar_wire_SampleBatch_desc, &trocar_wire_FlightBatch_desc,
-                                                                             &trocar_wire_Status_desc,      &trocar_wire_Event_desc,
-                                                                             &trocar_wire_Command_desc,     &trocar_wire_Reply_desc};
+  const std::array<const dds_topic_descriptor_t*, topics.size()> descriptors{
+      &trocar_wire_SampleBatch_desc, &trocar_wire_FlightBatch_desc, &trocar_wire_Status_desc, &trocar_wire_Event_desc,
+      &trocar_wire_Command_desc,     &trocar_wire_Reply_desc,       &trocar_wire_Markers_desc};
   for (const auto* descriptor : descriptors) {
     if (std::string_view(descriptor->m_typename) == topic.type) return *descriptor;
   }

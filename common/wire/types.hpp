@@ -13,6 +13,7 @@ using Status = trocar_wire_Status;
 using Event = trocar_wire_Event;
 using Command = trocar_wire_Command;
 using Reply = trocar_wire_Reply;
+using Markers = trocar_wire_Markers;
 
 // How each type is laid out …
 template <class T>
@@ -45,6 +46,10 @@ template <>
 inline const dds_topic_descriptor_t& descriptor<Reply>() noexcept {
   return trocar_wire_Reply_desc;
 }
+template <>
+inline const dds_topic_descriptor_t& descriptor<Markers>() noexcept {
+  return trocar_wire_Markers_desc;
+}
 
 // … and the one topic that it travels on, so that the type alone names topic and quality of service. A Sample travels in batches only.
 template <class T>
@@ -61,6 +66,8 @@ template <>
 inline constexpr Topic topic_of<Command> = command_topic;
 template <>
 inline constexpr Topic topic_of<Reply> = reply_topic;
+template <>
+inline constexpr Topic topic_of<Markers> = markers_topic;
 
 template <class T>
 concept Topical = topic_of<T>

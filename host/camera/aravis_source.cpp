@@ -200,6 +200,8 @@ class AravisSource : public Source {
     std::memcpy(frame.pixels.data(), data, wanted);
     const std::uint64_t stamp = arv_buffer_get_timestamp(buffer);
     frame.number = number_;
+    frame.arrived_ns = now_ns();
+    frame.time_uncertainty_ns = 0;
     frame.time_ns = static_cast<std::int64_t>(stamp != 0 ? stamp : arv_buffer_get_system_timestamp(buffer));
     ++counters_.frames;
     return true;

@@ -89,4 +89,12 @@ std::optional<std::int64_t> ClockOffset::to_local(std::int64_t remote_ns) const 
   return remote_ns + std::llround(under.at_ns + under.slope * static_cast<double>(remote_ns - points_.back().remote_ns));
 }
 
+std::optional<std::int64_t> ClockOffset::to_remote(std::int64_t local_ns) const {
+  if (points_.size() < 2) return std::nullopt;
+  const Line under = line();
+  const std::int64_t newest = points_.back().remote_ns, offset = std::llround(under.at_ns);
+  // local = newest + since + offset + slope * since
+  return newest + std::llround(static_cast<double>(local_ns - newest - offset) / (1.0 + under.slope));
+}
+
 }  // namespace trocar::camera

@@ -32,6 +32,7 @@ class ClockOffset {
   };
   [[nodiscard]] std::optional<Estimate> estimate() const;  // nothing before two pairs
   [[nodiscard]] std::optional<std::int64_t> to_local(std::int64_t remote_ns) const;
+  [[nodiscard]] std::optional<std::int64_t> to_remote(std::int64_t local_ns) const;
   [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
 
  private:

@@ -11,17 +11,11 @@
 #include "common/config/user_error.hpp"
 #include "host/camera/aravis_source.hpp"
 #include "host/camera/clock_offset.hpp"
-#include "host/camera/queue.hpp"
 
 namespace trocar::camera {
 namespace {
 
-constexpr std::size_t queue_depth = 16;
 constexpr std::chrono::milliseconds look_up{200};
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 void write_png(const optics::Frame& frame, const std::filesystem::path& file) {
   const bool colour = frame.format == optics::PixelFormat::Rgb8;
@@ -63,9 +57,8 @@ int run_list(bool json) {
 int run_grab(const GrabOptions& options, const std::atomic<bool>& stop) {
   if (std::filesystem::exists(options.out))
     throw config::UserError(fmt::format("{}: is there already; name a new folder", options.out.string()));
-  auto source = open_source(options.source, options.source_options);
+  const auto source = open_source(options.source, options.source_options);
   const Clock clock = source->clock();
-  if (clock == Clock::Camera) source = std::make_unique<QueuedSource>(std::move(source), queue_depth);
   std::error_code error;
   if (!std::filesystem::create_directory(options.out, error))
     throw config::UserError(
@@ -79,7 +72,7 @@ int run_grab(const GrabOptions& options, const std::atomic<bool>& stop) {
   int code = 0;
   while (!stop.load() && (options.frames == 0 || count < options.frames)) {
     const Source::Status status = source->next(frame, look_up);
-    const std::int64_t arrival_ns = now_ns();
+    const std::int64_t arrival_ns = frame.arrived_ns != 0 ? frame.arrived_ns : now_ns();
     for (const std::string& line : source->notices()) fmt::print(stderr, "trocar: {}\n", line);
     if (status == Source::Status::Timeout) continue;
     if (status == Source::Status::End) break;
@@ -92,11 +85,11 @@ int run_grab(const GrabOptions& options, const std::atomic<bool>& stop) {
       first_ns = frame.time_ns;
       first_arrival_ns = arrival_ns;
     }
-    if (clock != Clock::Rate && !offset.see(frame.time_ns, arrival_ns) && count > 0)
+    if (clock == Clock::Camera && !offset.see(frame.time_ns, arrival_ns) && count > 0)
       fmt::print(stderr, "trocar: frame {}: the {}'s clock stepped\n", frame.number, to_string(clock));
     const std::string name = fmt::format("frame_{:06}.png", frame.number);
     write_png(frame, options.out / name);
-    table << fmt::format("{},{},{},{}\n", frame.number, 1e-9 * static_cast<double>(frame.time_ns - first_ns),
+    table << fmt::format("{},{},{},{}\n", frame.number, 1e-9 * static_cast<double>(frame.time_ns - (clock == Clock::Rig ? 0 : first_ns)),
                          1e-9 * static_cast<double>(arrival_ns - first_arrival_ns), name)
           << std::flush;
     if (!table) throw config::UserError(fmt::format("{}: cannot be written: is the disk full?", (options.out / "frames.csv").string()));

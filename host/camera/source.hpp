@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,7 @@ struct SourceCounters {
   std::uint64_t dropped{};  // by our queue, because nobody took them in time
 };
 
-// Whose clock Frame::time_ns is.
-enum class Clock {
-  Camera,  // from an arbitrary zero
-  Rig,     // the controller's, from its start
-  Rate,    // none: frame number over the rate given
-};
+using optics::Clock;
 [[nodiscard]] const char* to_string(Clock clock) noexcept;
 
 class Source {
@@ -50,12 +46,15 @@ class Source {
 };
 
 struct SourceOptions {
-  double rate_hz{30.0};  // of files and videos; asked of a camera
-  double exposure_s{};   // asked of a camera; 0: as it is
-  bool bayer{};          // one-channel files hold a Bayer pattern (RGGB)
+  double rate_hz{30.0};                   // of files and videos; asked of a camera
+  double exposure_s{};                    // asked of a camera; 0: as it is
+  bool bayer{};                           // one-channel files hold a Bayer pattern (RGGB)
+  std::optional<std::uint32_t> domain{};  // DDS domain of a rig, whose clock times are then on (rig_clock.hpp)
 };
 
-// Throws config::UserError: nothing there under that name.
+[[nodiscard]] std::int64_t now_ns();  // CLOCK_MONOTONIC, as Frame::arrived_ns
+
+// What does not wait, a camera, is read into a short queue (queue.hpp). Throws config::UserError: nothing there under that name.
 [[nodiscard]] std::unique_ptr<Source> open_source(const std::vector<std::string>& names, const SourceOptions& options);
 
 }  // namespace trocar::camera

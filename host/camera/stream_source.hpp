@@ -14,7 +14,7 @@ class StreamSource : public Source {
   explicit StreamSource(const std::filesystem::path& socket);  // throws config::UserError when nobody serves it within some seconds
   Status next(optics::Frame& frame, std::chrono::milliseconds timeout) override;
   [[nodiscard]] SourceCounters counters() const override { return counters_; }
-  [[nodiscard]] Clock clock() const override { return Clock::Rig; }
+  [[nodiscard]] Clock clock() const override { return client_.clock(); }
   [[nodiscard]] std::string what() const override { return what_; }
   std::vector<std::string> notices() override { return std::exchange(notices_, {}); }
 

@@ -38,6 +38,7 @@ std::string summary(const Recording& recording, const std::filesystem::path& pat
   std::string line = "recorded " + count(wire::samples_topic) + " samples, " + count(wire::events_topic) + " events, " +
                      count(wire::command_topic) + " commands, " + count(wire::reply_topic) + " replies to " + path.string();
   if (recording.messages.contains(wire::flight_topic.name)) line += ", with " + count(wire::flight_topic) + " samples of flight recordings";
+  if (recording.messages.contains(wire::markers_topic.name)) line += ", with " + count(wire::markers_topic) + " frames of markers";
   if (recording.ticks.lost() > 0) {
     line += "; " + std::to_string(recording.ticks.lost()) + " ticks lost in " + std::to_string(recording.ticks.gaps()) + " gaps";
   }

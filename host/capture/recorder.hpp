@@ -1,4 +1,4 @@
-// Records a rig: every sample, status, event, command and reply that passes on DDS goes to one MCAP file.
+// Records a rig: everything that passes on the topics of common/wire goes to one MCAP file.
 #pragma once
 
 #include <atomic>

@@ -76,10 +76,11 @@ constexpr const char* network = R"(<General>
 </Security>
 )";
 
-std::string topics(bool commands, bool others) {
+template <class Which>
+std::string topics(Which which) {
   std::string list;
   for (const wire::Topic& topic : wire::topics)
-    if (topic == wire::command_topic ? commands : others) list += fmt::format("<topic>{}</topic>", topic.name);
+    if (which(topic)) list += fmt::format("<topic>{}</topic>", topic.name);
   return list;
 }
 
@@ -93,8 +94,9 @@ std::string date_after(int days) {
 }
 
 std::string permissions(const std::string& role) {
-  const bool rig = role == "rig";
-  const std::string writes = topics(role == "host", rig), reads = topics(true, !rig);
+  const bool rig = role == "rig", observer = role == "observer";
+  const std::string writes = topics([&](const wire::Topic& topic) { return !observer && topic.from_host != rig; });
+  const std::string reads = topics([&](const wire::Topic& topic) { return !rig || topic == wire::command_topic; });
   return fmt::format(R"(<?xml version="1.0" encoding="UTF-8"?>
 <dds><permissions><grant name="{0}">
   <subject_name>CN=trocar {0}</subject_name>

@@ -20,16 +20,15 @@
 #include "common/config/quote.hpp"
 #include "common/config/user_error.hpp"
 #include "common/optics/pose_file.hpp"
-#include "host/camera/queue.hpp"
 #include "host/tracking/picture.hpp"
 #include "host/tracking/plane_pose.hpp"
+#include "host/tracking/publish.hpp"
 
 namespace trocar::tracking {
 namespace {
 
 using Timer = std::chrono::steady_clock;
 
-constexpr std::size_t queue_depth = 4;
 constexpr std::chrono::milliseconds look_up{200};  // for the end that the user asks for
 constexpr double grid_patience_s = 30.0;           // of a live camera, until it shows the grid
 
@@ -125,12 +124,10 @@ double percentile(std::vector<double> values, double part) {
 
 class Run {
  public:
-  Run(const TrackOptions& options, const Listener& listener)
-      : options_(options), listener_(listener), camera_(optics::read_camera(options.camera)), tracker_(options.tracker) {
+  explicit Run(const TrackOptions& options) : options_(options), camera_(optics::read_camera(options.camera)), tracker_(options.tracker) {
     if (!options.pose.empty()) view_.emplace(camera_.lens, optics::read_pose(options.pose));
     source_ = camera::open_source(options.source, options.source_options);
-    // A camera does not wait. Files and the simulation do.
-    if (source_->clock() == camera::Clock::Camera) source_ = std::make_unique<camera::QueuedSource>(std::move(source_), queue_depth);
+    if (options.source_options.domain) publisher_.emplace(*options.source_options.domain, options.tracker.grid);
     begun_ = Timer::now();
   }
 
@@ -176,10 +173,13 @@ class Run {
     } else {
       dark_ = false;
     }
-    const TrackedFrame tracked{frame.number, frame.time_ns, source_->clock(), tracker_.markers(), metric_, source_->counters(), ms};
-    const std::int64_t zero = source_->clock() == camera::Clock::Camera ? first_ns_ : 0;
+    const TrackedFrame tracked{frame.number,       frame.time_ns, frame.time_uncertainty_ns, source_->clock(),
+                               tracker_.markers(), metric_,       source_->counters(),       ms};
+    const bool own_zero = source_->clock() == camera::Clock::Camera || source_->clock() == camera::Clock::Host;
+    const std::int64_t zero = own_zero ? first_ns_ : 0;
+    uncertainty_ns_ = std::max(uncertainty_ns_, frame.time_uncertainty_ns);
     append(*files_, options_.tracker.grid, tracked, 1e-9 * static_cast<double>(frame.time_ns - zero));
-    if (listener_) listener_(tracked);
+    if (publisher_) publisher_->publish(tracked);
     keep_if_moved_most(frame);
   }
 
@@ -249,36 +249,47 @@ class Run {
     const camera::SourceCounters c = source_->counters();
     const std::size_t all = frames_ * tracker_.markers().size();
     const double p50 = percentile(ms_, 0.5), p99 = percentile(ms_, 0.99);
+    if (!options_.summary.empty()) {
+      config::NewFile file(options_.summary);
+      file.stream() << fmt::format(
+          "# What trocar track saw.\nsource = {}\nclock = \"{}\"\ntime_uncertainty_s = {:g}\nframes = {}\nframes_lost = {}\n"
+          "frames_dropped = {}\nmarkers = {}\nmarkers_not_seen = {}\nfewest_markers = {}\ntrack_s_p50 = {:g}\ntrack_s_p99 = {:g}\n",
+          config::quote(source_->what()), camera::to_string(source_->clock()), 1e-9 * static_cast<double>(uncertainty_ns_), frames_, c.lost,
+          c.dropped, tracker_.markers().size(), lost_markers_, fewest_, 1e-3 * p50, 1e-3 * p99);
+      file.keep();
+    }
     if (options_.json) {
       const auto number = [](double x) { return std::isnan(x) ? std::string("null") : fmt::format("{:.6g}", x); };
       fmt::print(
-          "{{\"source\": {}, \"clock\": \"{}\", \"frames\": {}, \"frames_lost\": {}, \"frames_dropped\": {}, \"markers\": {}, "
+          "{{\"source\": {}, \"clock\": \"{}\", \"time_uncertainty_us\": {:.3f}, \"frames\": {}, \"frames_lost\": {}, \"frames_dropped\": "
+          "{}, \"markers\": {}, "
           "\"markers_not_seen\": {}, \"fewest_markers\": {}, \"radius_px\": {:.4f}, \"pose_rms_px\": {}, \"track_ms_p50\": {}, "
           "\"track_ms_p99\": {}}}\n",
-          config::quote(source_->what()), to_string(source_->clock()), frames_, c.lost, c.dropped, tracker_.markers().size(), lost_markers_,
-          fewest_, tracker_.radius_px(), number(pose_rms_px_), number(p50), number(p99));
+          config::quote(source_->what()), camera::to_string(source_->clock()), 1e-3 * static_cast<double>(uncertainty_ns_), frames_, c.lost,
+          c.dropped, tracker_.markers().size(), lost_markers_, fewest_, tracker_.radius_px(), number(pose_rms_px_), number(p50),
+          number(p99));
     } else {
       fmt::print(
           "{} frames of {} markers, {} of {} places not seen; {} frames lost, {} dropped; {:.2f} ms a frame (p99 {:.2f}); times on the "
           "{}\n",
           frames_, tracker_.markers().size(), lost_markers_, all, c.lost, c.dropped, p50, p99,
-          source_->clock() == camera::Clock::Rate ? "rate given" : fmt::format("{}'s clock", to_string(source_->clock())));
+          source_->clock() == camera::Clock::Rate ? "rate given" : fmt::format("{}'s clock", camera::to_string(source_->clock())));
       fmt::print("{} written\n", options_.out.string());
     }
     return code;
   }
 
   TrackOptions options_;
-  Listener listener_;
   optics::Camera camera_;
   Tracker tracker_;
   std::unique_ptr<camera::Source> source_{};
   std::optional<optics::PlaneView> view_{};
   std::unique_ptr<Files> files_{};
+  std::optional<Publisher> publisher_{};
   Timer::time_point begun_{};
   bool started_{}, dark_{};
   double pose_rms_px_{std::nan("")};
-  std::int64_t first_ns_{};
+  std::int64_t first_ns_{}, uncertainty_ns_{};
   std::size_t frames_{}, lost_markers_{}, fewest_{static_cast<std::size_t>(-1)};
   std::vector<double> ms_{};
   std::vector<MetricMarker> metric_{};
@@ -306,7 +317,7 @@ std::string parse_corners(const std::vector<std::string>& texts, std::vector<dou
   return {};
 }
 
-int run_track(const TrackOptions& options, const Listener& listener, const std::atomic<bool>& stop) {
+int run_track(const TrackOptions& options, const std::atomic<bool>& stop) {
   if (!options.covariance.empty() && options.covariance == options.out)
     throw config::UserError(
         fmt::format("{}: markers and covariances cannot be one file; give --covariance another name", options.out.string()));
@@ -314,7 +325,7 @@ int run_track(const TrackOptions& options, const Listener& listener, const std::
     throw config::UserError(
         fmt::format("--picture {}: no kind of image that can be written here; give a name that ends in .png", options.picture.string()));
   cv::setNumThreads(std::max(1, options.tracker.threads));
-  return Run(options, listener).run(stop);
+  return Run(options).run(stop);
 }
 
 }  // namespace trocar::tracking

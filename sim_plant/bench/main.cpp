@@ -25,13 +25,12 @@
 #include "common/experiment/experiment_file.hpp"
 #include "common/experiment/truth_file.hpp"
 #include "common/model/image.hpp"
-#include "common/optics/frame_stream.hpp"
 #include "common/scene/scene.hpp"
 #include "common/wire/convert.hpp"
 #include "firmware/control/force_observer.hpp"
 #include "firmware/virtual_needle/virtual_needle.hpp"
 #include "sim_plant/bench/bench.hpp"
-#include "sim_plant/camera/camera.hpp"
+#include "sim_plant/camera/eye.hpp"
 #include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 
@@ -73,50 +72,32 @@ struct Model {
 
 // The camera over the phantom: a frame at every whole period of its own, each waited for, so that none is lost and equal seeds give equal
 // frames.
-class Eye {
+class Watcher {
  public:
-  Eye(const Options& options, const sim_plant::PlantConfig& plant, const scene::Scene& scene, const sim_plant::Phantom& phantom)
-      : config_(plant.camera.value()),
-        surface_(phantom, scene, config_.grid),
-        camera_(config_, surface_.origin_m(), scene.needle->length_m, options.seed),
-        server_(options.camera_socket),
-        truth_(options.out / "markers_truth.csv") {
-    truth_.stream() << "frame,t_s,row,col,u_px,v_px,x_m,y_m,visible\n";
-    constexpr std::chrono::seconds patience{20};
+  Watcher(const Options& options, const sim_plant::PlantConfig& plant, const scene::Scene& scene, const sim_plant::Phantom& phantom)
+      : rate_hz_(plant.camera->rate_hz),
+        eye_({*plant.camera, options.camera_socket, options.out / "markers_truth.csv", options.seed}, scene, phantom, optics::Clock::Rig) {
     fmt::print("camera at {}\n", options.camera_socket.string());
     std::fflush(stdout);
-    if (!server_.wait_for_client(patience))
+    if (!eye_.watched(patience))
       throw config::UserError(fmt::format("{}: nobody came to watch for {} s; start trocar track stream:{}", options.camera_socket.string(),
                                           patience.count(), options.camera_socket.string()));
   }
   void look(const sim_plant::Plant& plant, std::int64_t now_ns) {
-    if (static_cast<double>(now_ns) < 1e9 * static_cast<double>(number_) / config_.rate_hz) return;
-    surface_.take(plant.phantom(), now_ns, plant.pose(), state_);
-    camera_.render(state_, number_, frame_);
-    constexpr std::chrono::seconds patience{20};
-    if (watched_ && !server_.send(frame_, patience)) {
+    if (static_cast<double>(now_ns) < 1e9 * static_cast<double>(number_) / rate_hz_) return;
+    eye_.take(plant.phantom(), now_ns, plant.pose(), state_);
+    if (!eye_.show(state_, number_++, patience) && watched_) {
       watched_ = false;
       fmt::print(stderr, "trocar-bench: whoever watched the camera is gone; the experiment goes on without\n");
     }
-    for (int row = 0; row < config_.grid.rows; ++row) {
-      for (int column = 0; column < config_.grid.columns; ++column) {
-        const optics::MarkerTruth& m = camera_.truth()[config_.grid.index(row, column)];
-        truth_.stream() << fmt::format("{},{},{},{},{},{},{},{},{}\n", number_, 1e-9 * static_cast<double>(now_ns), row, column,
-                                       m.pixel.u_px, m.pixel.v_px, m.at.x_m, m.at.y_m, m.visible ? 1 : 0);
-      }
-    }
-    ++number_;
   }
-  void finish() { truth_.keep(); }
+  void finish() { eye_.finish(); }
 
  private:
-  sim_plant::CameraConfig config_;
-  sim_plant::Surface surface_;
-  sim_plant::Camera camera_;
-  optics::FrameServer server_;
-  config::NewFile truth_;
+  static constexpr std::chrono::seconds patience{20};
+  double rate_hz_;
+  sim_plant::Eye eye_;
   sim_plant::SurfaceState state_{};
-  optics::Frame frame_{};
   std::uint64_t number_{};
   bool watched_{true};
 };
@@ -157,9 +138,9 @@ int run(const Options& options) {
   if (error)
     throw config::UserError(
         fmt::format("{}: cannot be made ({}): give a folder that you may write to with --out", options.out.string(), error.message()));
-  std::unique_ptr<Eye> eye;
+  std::unique_ptr<Watcher> eye;
   try {
-    if (watched) eye = std::make_unique<Eye>(options, plant, scene, bench.plant().physics().phantom());
+    if (watched) eye = std::make_unique<Watcher>(options, plant, scene, bench.plant().physics().phantom());
   } catch (...) {
     if (made) std::filesystem::remove(options.out, error);  // still empty: nothing was run
     throw;

@@ -13,24 +13,13 @@
 #include <string>
 #include <vector>
 
-#include "common/config/document.hpp"
 #include "common/contact/geometry.hpp"
 #include "common/optics/render.hpp"
+#include "common/optics/simulated_camera.hpp"
 #include "common/scene/scene.hpp"
 #include "sim_plant/phantom/phantom.hpp"
 
 namespace trocar::sim_plant {
-
-// A camera's share of a plant file, [camera]:
-//   name = "thesis_half", rate_hz, setting = "clean" | "hard", m_per_px, exposure_s, rows, columns, spacing_m, diameter_m
-struct CameraConfig {
-  std::string name{};  // of a camera in share/cameras, or a path
-  double rate_hz{};
-  optics::Appearance appearance{};
-  optics::MarkerGrid grid{};
-  double m_per_px{};
-};
-[[nodiscard]] CameraConfig read_camera(const config::Table& table);  // throws config::UserError
 
 struct SurfaceState {  // of one instant
   std::int64_t time_ns{};
@@ -58,7 +47,7 @@ class Surface {
 class Camera {
  public:
   // Throws config::UserError: no such camera, one that does not see the phantom.
-  Camera(const CameraConfig& config, const std::array<double, 2>& origin_m, double needle_length_m, std::uint64_t seed);
+  Camera(const optics::SimulatedCamera& config, const std::array<double, 2>& origin_m, double needle_length_m, std::uint64_t seed);
   // Velocities, for blur and rolling shutter, are those since the last frame.
   void render(const SurfaceState& state, std::uint64_t number, optics::Frame& frame);
   [[nodiscard]] std::span<const optics::MarkerTruth> truth() const noexcept { return renderer_->truth(); }

@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "sim_plant/camera/camera.hpp"
+#include "common/optics/simulated_camera.hpp"
 #include "sim_plant/mechanism/imperfection.hpp"
 #include "sim_plant/mechanism/joint_friction.hpp"
 
@@ -22,7 +22,7 @@ struct PlantConfig {
   double stop_singularity{};  // the handle is caught there; below the rig's own limit
   double force_noise_n{};     // standard deviation of each component of a sensor reading
   double torque_noise_nm{};
-  std::optional<CameraConfig> camera{};  // over the phantom
+  std::optional<optics::SimulatedCamera> camera{};  // over the phantom
 };
 
 }  // namespace trocar::sim_plant

@@ -43,7 +43,7 @@ PlantConfig read_plant(const std::filesystem::path& file) {
   const config::Table sensor = root.table("sensor");
   plant.force_noise_n = sensor.number("force_noise_n", {0.0, 10.0}, "standard deviation, such as 0.0125");
   plant.torque_noise_nm = sensor.number("torque_noise_nm", {0.0, 1.0}, "standard deviation, such as 6.25e-5");
-  if (const auto camera = root.optional_table("camera")) plant.camera = read_camera(*camera);
+  if (const auto camera = root.optional_table("camera")) plant.camera = optics::read_simulated_camera(*camera);
   document.refuse_unknown_keys();
   return plant;
 }

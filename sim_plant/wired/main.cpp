@@ -8,6 +8,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@
 #include "hal/can/candump.hpp"
 #include "hal/can/endpoint_bus.hpp"
 #include "hal/realtime/clock.hpp"
+#include "sim_plant/camera/eye.hpp"
 #include "sim_plant/hand/hand_file.hpp"
 #include "sim_plant/plant/plant_file.hpp"
 #include "sim_plant/wired/wired_plant.hpp"
@@ -40,6 +42,7 @@ struct Options {
   std::uint64_t seed = 1;
   bool log_drives{};
   std::string can_log;
+  std::filesystem::path camera_socket, camera_truth;
 };
 
 // Every frame of both buses, as candump -L of can-utils writes them.
@@ -109,6 +112,14 @@ int run(const Options& options) {
   if (!options.can_log.empty()) log.open(options.can_log, rig.buses);
   auto plant = std::make_unique<sim_plant::WiredPlant>(rig, plant_config, scene, options.seed);
   if (hand) plant->give_to(&*hand);
+  std::optional<sim_plant::LiveEye> eye;
+  if (!options.camera_socket.empty()) {
+    if (!scene || !plant_config.camera)
+      throw config::UserError(fmt::format("--camera-socket: {}; leave it out",
+                                          scene ? "plant " + options.plant + " has no [camera]" : "there is no tissue to look at"));
+    eye.emplace(sim_plant::EyeOptions{*plant_config.camera, options.camera_socket, options.camera_truth, options.seed}, *scene,
+                plant->physics().phantom());
+  }
   fmt::print("trocar-plant: {} before {}{}, seed {}\n", rig.name.data(), scene ? "scene " + options.scene : "no tissue",
              hand ? ", with hand " + options.hand : "", options.seed);
   std::fflush(stdout);
@@ -150,6 +161,7 @@ int run(const Options& options) {
       sensor.send(frame, now_ns);
     }
     sensor.flush(now_ns);
+    if (eye) eye->look(plant->physics().phantom(), plant->physics().pose(), wall);
     if (!options.log_drives) continue;
     for (std::size_t i = 0; i < plant->drives; ++i) {
       if (plant->drive(i).state() == known[i]) continue;
@@ -161,10 +173,13 @@ int run(const Options& options) {
     }
   }
   if (!log.close()) throw config::UserError(fmt::format("--can-log {}: not everything could be written: is the disk full?", log.path()));
+  if (eye) eye->finish();
   const auto& p = plant->physics();
   fmt::print("trocar-plant: stopped after {:.1f} s; starved {} times", 1e-9 * static_cast<double>(p.time_ns()), starved);
   if (scene) fmt::print("; phantom: {} steps, {} unconverged", p.phantom().counters().steps, p.phantom().counters().unconverged);
+  if (eye) fmt::print("; camera: {} frames sent, {} skipped", eye->sent(), eye->skipped());
   fmt::print("\n");
+  if (eye && !eye->problem().empty()) throw config::UserError(fmt::format("the camera ended early: {}", eye->problem()));
   return 0;
 }
 
@@ -186,6 +201,10 @@ int main(int argc, char** argv) {
   app.add_flag("--log-drives", options.log_drives,
                "print every change of a drive's state, with the plant's time, torque and the controller's silence");
   app.add_option("--can-log", options.can_log, "file for every frame of both buses, in the format of candump -L (can-utils reads it)");
+  auto* socket = app.add_option("--camera-socket", options.camera_socket,
+                                "socket on which the camera over the phantom is served in real time (trocar track stream:SOCKET)");
+  app.add_option("--camera-truth", options.camera_truth, "CSV of where its markers were: frame,t_s,row,col,u_px,v_px,x_m,y_m,visible")
+      ->needs(socket);
   app.add_flag("--die-with-parent", die_with_parent, "stop when the process that started this one ends");
   try {
     app.parse(argc, argv);

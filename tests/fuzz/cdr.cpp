@@ -43,7 +43,7 @@ void split(std::span<const std::byte> cdr) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const auto cdr = std::as_bytes(std::span(data, size)).subspan(1);
-  switch (data[0] % 6) {
+  switch (data[0] % 7) {
     case 0:
       split<wire::SampleBatch>(cdr);
       break;
@@ -59,8 +59,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 4:
       decode<wire::Command>(cdr);
       break;
-    default:
+    case 5:
       decode<wire::Reply>(cdr);
+      break;
+    default:
+      decode<wire::Markers>(cdr);
       break;
   }
   return 0;

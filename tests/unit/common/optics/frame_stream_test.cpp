@@ -8,6 +8,8 @@
 
 #include <cstring>
 #include <fstream>
+#include <future>
+#include <memory>
 #include <optional>
 #include <thread>
 
@@ -42,23 +44,29 @@ class FrameStream : public ::testing::Test {
     EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
     return fd;
   }
+  // A client that was greeted.
+  [[nodiscard]] std::unique_ptr<FrameClient> watch(FrameServer& server) const {
+    auto client = std::async(std::launch::async, [this] { return std::make_unique<FrameClient>(socket_, 5s); });
+    EXPECT_TRUE(server.wait_for_client(5s));
+    return client.get();
+  }
   std::filesystem::path folder_{}, socket_{};
 };
 
 TEST_F(FrameStream, FramesArriveWholeAndInOrder) {
-  FrameServer server(socket_);
+  FrameServer server(socket_, Clock::Rig);
   struct stat file {};
   ASSERT_EQ(::stat(socket_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 0777U, 0600U);
   EXPECT_FALSE(server.send(frame(0), 10ms));  // nobody is there
-  FrameClient client(socket_, 0ms);
+  const auto client = watch(server);
   std::thread sender([&] {
     for (std::uint64_t k = 1; k <= 20; ++k)
       EXPECT_TRUE(server.send(frame(k, 640, 480, k % 2 == 0 ? PixelFormat::Rgb8 : PixelFormat::BayerRG8), 5s));
   });
   Frame got;
   for (std::uint64_t k = 1; k <= 20; ++k) {
-    ASSERT_EQ(client.receive(got, 5s), Status::Frame);
+    ASSERT_EQ(client->receive(got, 5s), Status::Frame);
     const Frame sent = frame(k, 640, 480, k % 2 == 0 ? PixelFormat::Rgb8 : PixelFormat::BayerRG8);
     EXPECT_EQ(got.number, k);
     EXPECT_EQ(got.time_ns, sent.time_ns);
@@ -67,32 +75,33 @@ TEST_F(FrameStream, FramesArriveWholeAndInOrder) {
   }
   sender.join();
   EXPECT_EQ(server.sent(), 20u);
-  EXPECT_EQ(client.receive(got, 1ms), Status::Timeout);
+  EXPECT_EQ(client->receive(got, 1ms), Status::Timeout);
 }
 
 TEST_F(FrameStream, ASlowClientIsDroppedAndNotWaitedFor) {
-  FrameServer server(socket_);
+  FrameServer server(socket_, Clock::Rig);
   const int lazy = raw_connection();  // never reads
   const Frame large = frame(0, 2000, 2000);
   EXPECT_FALSE(server.send(large, 20ms));
   EXPECT_EQ(server.sent(), 0u);
   // The next one is served.
-  FrameClient client(socket_, 0ms);
+  const auto client = watch(server);
   std::thread sender([&] { EXPECT_TRUE(server.send(frame(1), 5s)); });
   Frame got;
-  EXPECT_EQ(client.receive(got, 5s), Status::Frame);
+  EXPECT_EQ(client->receive(got, 5s), Status::Frame);
   sender.join();
   ::close(lazy);
 }
 
 TEST_F(FrameStream, AServersEndIsToldFromItsDeath) {
-  std::optional<FrameServer> server(socket_);
-  FrameClient client(socket_, 0ms);
+  std::optional<FrameServer> server(std::in_place, socket_, Clock::Host);
+  const auto client = watch(*server);
+  EXPECT_EQ(client->clock(), Clock::Host);
   ASSERT_TRUE(server->send(frame(1), 1s));
   server.reset();
   Frame got;
-  EXPECT_EQ(client.receive(got, 1s), Status::Frame);  // what came before is whole
-  EXPECT_EQ(client.receive(got, 1s), Status::Closed);
+  EXPECT_EQ(client->receive(got, 1s), Status::Frame);  // what came before is whole
+  EXPECT_EQ(client->receive(got, 1s), Status::Closed);
   EXPECT_FALSE(std::filesystem::exists(socket_));
 }
 
@@ -117,6 +126,13 @@ class Impostor {
   int listener_;
 };
 
+std::vector<std::byte> greeting(const char* magic, std::uint32_t clock) {
+  std::vector<std::byte> out(16);
+  std::memcpy(out.data(), magic, 8);
+  std::memcpy(out.data() + 8, &clock, sizeof clock);
+  return out;
+}
+
 std::vector<std::byte> head(const char* magic, std::uint32_t width, std::uint32_t height, std::uint32_t format, std::uint32_t bytes) {
   std::vector<std::byte> out(40);
   std::memcpy(out.data(), magic, 8);
@@ -128,8 +144,11 @@ std::vector<std::byte> head(const char* magic, std::uint32_t width, std::uint32_
 TEST_F(FrameStream, WhatIsNoFrameIsForeignAndHalfAFrameBroken) {
   const Impostor server(socket_);
   const auto hears = [&](const std::vector<std::byte>& bytes) {
-    FrameClient client(socket_, 0ms);
-    server.say(bytes);
+    std::vector<std::byte> all = greeting("trcamer1", 2);
+    all.insert(all.end(), bytes.begin(), bytes.end());
+    const auto said = std::async(std::launch::async, [&] { server.say(all); });
+    FrameClient client(socket_, 5s);
+    EXPECT_EQ(client.clock(), Clock::Rig);
     Frame got;
     return client.receive(got, 1s);
   };
@@ -144,10 +163,37 @@ TEST_F(FrameStream, WhatIsNoFrameIsForeignAndHalfAFrameBroken) {
   EXPECT_EQ(hears(half), Status::Broken);
 }
 
+TEST_F(FrameStream, WhoDoesNotGreetIsNoCamera) {
+  const Impostor server(socket_);
+  const auto refused = [&](const std::vector<std::byte>& bytes, const char* part) {
+    const auto said = std::async(std::launch::async, [&] { server.say(bytes); });
+    try {
+      const FrameClient client(socket_, 5s);
+      ADD_FAILURE() << part;
+    } catch (const config::UserError& e) {
+      EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
+    }
+  };
+  refused(greeting("trcamer2", 0), "programs of one build");
+  refused(greeting("trcamer1", 4), "programs of one build");
+  refused({}, "does not greet");
+}
+
+TEST_F(FrameStream, ASecondWatcherIsTold) {
+  FrameServer server(socket_, Clock::Rig);
+  const auto first = watch(server);
+  try {
+    const FrameClient second(socket_, 50ms);
+    ADD_FAILURE();
+  } catch (const config::UserError& e) {
+    EXPECT_NE(std::string(e.what()).find("another program watches it"), std::string::npos) << e.what();
+  }
+}
+
 TEST_F(FrameStream, RefusesNamesAndPlacesThatCannotBe) {
   const auto refused = [](const std::filesystem::path& path, const char* part) {
     try {
-      FrameServer server(path);
+      FrameServer server(path, Clock::Rig);
       ADD_FAILURE() << path;
     } catch (const config::UserError& e) {
       EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
@@ -158,13 +204,13 @@ TEST_F(FrameStream, RefusesNamesAndPlacesThatCannotBe) {
   std::ofstream(folder_ / "file") << "text";
   refused(folder_ / "file", "no socket");
   {
-    FrameServer first(socket_);
+    FrameServer first(socket_, Clock::Rig);
     refused(socket_, "another camera is served there");
   }
   // One that a dead server left behind is replaced.
   { Impostor dead(socket_); }
   ASSERT_TRUE(std::filesystem::exists(socket_));
-  FrameServer again(socket_);
+  FrameServer again(socket_, Clock::Rig);
   try {
     FrameClient nobody(folder_ / "none", 0ms);
     ADD_FAILURE();

@@ -38,6 +38,7 @@ TEST(ClockOffset, FollowsADriftingClockThroughJitter) {
       if (k < 150) continue;
       const auto local = clock.to_local(remote);
       ASSERT_TRUE(local);
+      EXPECT_NEAR(static_cast<double>(*clock.to_remote(*local) - remote), 0.0, 2.0);
       worst_ns = std::max(worst_ns, std::abs(static_cast<double>(*local - link.local(remote) - link.least_ns)));
     }
     EXPECT_LT(worst_ns, 60'000.0) << drift;  // jitter of 200 us, late ones of 20 ms

@@ -121,11 +121,13 @@ TEST_F(Sources, TheSimulatedCameraEndsOrDies) {
   const auto socket = folder_ / "camera";
   std::unique_ptr<Source> source;
   {
-    optics::FrameServer server(socket);
-    source = open_source({"stream:" + socket.string()}, {});
+    optics::FrameServer server(socket, Clock::Rig);
+    auto opened = std::async(std::launch::async, [&] { return open_source({"stream:" + socket.string()}, {}); });
+    ASSERT_TRUE(server.wait_for_client(5s));
+    source = opened.get();
     EXPECT_EQ(source->clock(), Clock::Rig);
     for (const std::uint64_t number : {3u, 4u, 7u})
-      ASSERT_TRUE(server.send({number, 5, 8, 4, optics::PixelFormat::Mono8, std::vector<std::uint8_t>(32)}, 1s));
+      ASSERT_TRUE(server.send({.number = number, .width_px = 8, .height_px = 4, .pixels = std::vector<std::uint8_t>(32)}, 1s));
     for (int k = 0; k < 3; ++k) ASSERT_EQ(source->next(frame_, 1s), Status::Frame);
     EXPECT_EQ(source->counters().lost, 2u);
     EXPECT_EQ(source->notices().at(0), "frames 5 to 6 are lost");

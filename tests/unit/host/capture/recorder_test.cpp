@@ -85,7 +85,14 @@ TEST_F(RecorderTest, RecordsEveryTopicAndCountsLostTicks) {
   const wire::Participant commander(test_domain());
   wire::Writer<wire::Command> commands(commander);
   wire::Writer<wire::Reply> replies(commander);
-  ASSERT_TRUE(eventually([&] { return commands.matched() == 1 && replies.matched() == 1; }));
+  wire::Writer<wire::Markers> markers(commander);
+  ASSERT_TRUE(eventually([&] { return commands.matched() == 1 && replies.matched() == 1 && markers.matched() == 1; }));
+  std::array<float, 2> u{1.5F, 2.5F};
+  wire::Markers frame{};
+  frame.frame = 7;
+  frame.u_px._buffer = u.data();
+  frame.u_px._length = frame.u_px._maximum = 2;
+  ASSERT_TRUE(markers.write(frame));
   ASSERT_TRUE(commands.write(wire::to_wire(Command{}, "", 0, 0)));
   ASSERT_TRUE(replies.write(wire::to_wire(Reply{}, "yes")));
   rig.say(0);
@@ -112,6 +119,13 @@ TEST_F(RecorderTest, RecordsEveryTopicAndCountsLostTicks) {
   EXPECT_EQ(log.samples.back().base_wrench[1], 0.1 * 64.0);
   EXPECT_EQ(log.ticks.lost(), 5u);
   EXPECT_EQ(log.events.at(0).text, "started");
+  capture::McapReader(folder_ / "x.mcap").read([](const capture::Message& message) {
+    if (message.channel->topic != wire::markers_topic.name) return;
+    const capture::Decoded<wire::Markers> seen(message.data);
+    EXPECT_EQ(seen->frame, 7u);
+    ASSERT_EQ(seen->u_px._length, 2u);
+    EXPECT_EQ(seen->u_px._buffer[1], 2.5F);
+  });
 }
 
 TEST_F(RecorderTest, SaysWhereItRecordsAndClosesTheFileWhenStopped) {
