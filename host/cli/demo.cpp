@@ -24,6 +24,7 @@
 #include "common/experiment/truth_file.hpp"
 #include "common/scene/scene.hpp"
 #include "common/wire/topics.hpp"
+#include "host/cli/demo_camera.hpp"
 #include "host/cli/process.hpp"
 #include "host/experiment/runner.hpp"
 #include "host/report/report.hpp"
@@ -74,13 +75,20 @@ std::filesystem::path make_folder(std::filesystem::path out) {
   if (error)
     throw config::UserError(
         fmt::format("{}: cannot write there ({}): give a folder that you may write to with --out", out.string(), error.message()));
-  for (const char* name : {"capture.mcap", "samples.csv", "truth.csv", "model.image", "run.toml", "report.html"})
+  for (const char* name : {"capture.mcap", "samples.csv", "truth.csv", "model.image", "markers.csv", "run.toml", "report.html"})
     if (std::filesystem::exists(out / name))
       throw config::UserError(fmt::format("{}: holds {} of an earlier run: give another folder with --out, or none", out.string(), name));
   return out;
 }
 
-int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const std::filesystem::path& out, std::atomic<bool>& stop) {
+// Of a simulated run, before tissue.
+std::optional<optics::SimulatedCamera> camera_of(const DemoOptions& options, const host::ExperimentSetup& setup) {
+  if (!options.camera || !options.own_rig || setup.experiment.haptic() || setup.experiment.plant.empty()) return std::nullopt;
+  return demo_camera(setup.experiment.plant);
+}
+
+int run_lockstep(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out,
+                 std::atomic<bool>& stop) {
   std::vector<std::string> arguments{"--experiment", options.experiment,           "--out",     out.string(),
                                      "--seed",       std::to_string(options.seed), "--progress"};
   if (!options.speeds_mm_s.empty()) {
@@ -88,13 +96,23 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
     arguments.push_back(fmt::format("{}", fmt::join(options.speeds_mm_s, ",")));
   }
   if (!options.hand.empty()) arguments.insert(arguments.end(), {"--hand", options.hand});
+  std::optional<DemoCamera> camera;
+  if (const auto seen = camera_of(options, setup)) {
+    camera.emplace(*seen, out);
+    arguments.insert(arguments.end(), {"--camera-socket", camera->socket()});
+  }
   Process bench("trocar-bench", arguments);
+  if (camera) {
+    bench.wait_for_line("camera at", ready_s);
+    camera->start(std::nullopt);
+  }
   ProgressLine line;
   std::string rest;
   std::string said;  // everything that is not progress
   while (true) {
     const std::string text = bench.read(0.1);
     if (text.empty() && !bench.running()) break;
+    if (camera) camera->drain();
     if (stop.load()) bench.signal(SIGINT);
     rest += text;
     for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n')) {
@@ -116,7 +134,8 @@ int run_lockstep(const DemoOptions& options, const host::ExperimentSetup&, const
   line.end();
   const int code = bench.wait(end_s);
   fmt::print(stderr, "{}", said);
-  return code;
+  const bool seen = !camera || camera->finish(false);
+  return code == 0 && !seen ? 1 : code;
 }
 
 void compile_image(const std::filesystem::path& scene, const std::filesystem::path& image, const std::atomic<bool>& stop) {
@@ -134,6 +153,7 @@ void compile_image(const std::filesystem::path& scene, const std::filesystem::pa
 int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup, const std::filesystem::path& out,
                   std::atomic<bool>& stop) {
   const std::uint32_t domain = options.domain >= 0 ? static_cast<std::uint32_t>(options.domain) : setup.rig.dds_domain;
+  std::optional<DemoCamera> camera;
   std::optional<Process> plant, rig, recorder;
   if (options.own_rig) {
     std::vector<std::string> plant_arguments{"--rig", setup.rig_file.string(), "--seed", std::to_string(options.seed), "--die-with-parent"};
@@ -147,11 +167,16 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
       rig_arguments.insert(rig_arguments.end(), {"--model", image.string()});
     } else {
       plant_arguments.insert(plant_arguments.end(), {"--scene", setup.scene_file.string()});
+      if (const auto seen = camera_of(options, setup)) {
+        camera.emplace(*seen, out);
+        plant_arguments.insert(plant_arguments.end(), {"--camera-socket", camera->socket(), "--camera-truth", camera->truth()});
+      }
     }
     plant.emplace("trocar-plant", plant_arguments);
     plant->wait_for_line(", seed", ready_s);
     rig.emplace("trocar-rig", rig_arguments);
     rig->wait_for_line("DDS domain", ready_s);
+    if (camera) camera->start(domain);
   }
   recorder.emplace("trocar", std::vector<std::string>{"record", "--out", (out / "capture.mcap").string(), "--domain",
                                                       std::to_string(domain), "--die-with-parent"});
@@ -160,7 +185,10 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
   ProgressLine line;
   experiment::Run run;
   try {
-    run = host::run_experiment(setup, domain, stop, [&](const host::Progress& p) { line.show(p); });
+    run = host::run_experiment(setup, domain, stop, [&](const host::Progress& p) {
+      line.show(p);
+      if (camera) camera->drain();
+    });
   } catch (...) {
     line.end();
     recorder->signal(SIGINT);
@@ -184,6 +212,7 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
   };
   stop_child(rig, "trocar-rig", SIGTERM);
   stop_child(recorder, "the recorder", SIGINT);
+  if (camera && !camera->finish(true)) clean = false;
   stop_child(plant, "trocar-plant", SIGTERM);
 
   experiment::write_run(out, run);
@@ -218,7 +247,7 @@ report::Phase::Kind report_kind(experiment::PhaseKind kind) {
   return To::Other;
 }
 
-void print_summary(const report::Summary& s) {
+void print_summary(const report::Summary& s, const std::optional<report::Eyes>& eyes) {
   for (const auto& d : s.displays) {
     if (d.ticks == 0) {
       fmt::print("{:<12} was not felt\n", d.name);
@@ -241,6 +270,11 @@ void print_summary(const report::Summary& s) {
   if (s.tick_us.count > 0)
     fmt::print("tick p50 {:.0f} us, p99 {:.0f} us, p99.99 {:.0f} us; wake-up late p50 {:.0f} us, p99 {:.0f} us, p99.99 {:.0f} us\n",
                s.tick_us.p50, s.tick_us.p99, s.tick_us.p99_99, s.wakeup_late_us.p50, s.wakeup_late_us.p99, s.wakeup_late_us.p99_99);
+  if (eyes)
+    fmt::print("camera: {} frames of {} markers, {} lost, {} dropped, {} of {} places not seen{}; tracked in {:.1f} ms a frame\n",
+               eyes->frames, eyes->markers, eyes->lost, eyes->dropped, eyes->not_seen, eyes->frames * eyes->markers,
+               eyes->error ? fmt::format(", off by {:.3f} px and {:.1f} um RMS", eyes->error->rms_px, 1e6 * eyes->error->rms_m) : "",
+               1e3 * eyes->track_s_p50);
   fmt::print("{} samples, {} lost, {} ticks without feedback, faults: {}\n", s.samples, s.lost_ticks, s.ticks_without_feedback,
              s.faults.empty() ? "none" : fmt::format("{}", fmt::join(s.faults, ", ")));
 }
@@ -271,6 +305,7 @@ int make_report(const std::filesystem::path& folder, bool json) {
   }
   if (std::filesystem::exists(folder / "truth.csv"))
     for (const experiment::Truth& t : experiment::read_truth(folder / "truth.csv")) info.truth.push_back({t.tick, t.hand_wrench});
+  info.eyes = report::read_eyes(folder);
   if (!run.completed) info.notes.push_back("the experiment did not finish: " + run.outcome);
   for (const capture::EventRecord& e : log.events) {
     // A recording of before this run is still sent to whoever comes late.
@@ -286,7 +321,7 @@ int make_report(const std::filesystem::path& folder, bool json) {
   if (json) {
     fmt::print("{}\n", report::to_json(info, summary));
   } else {
-    print_summary(summary);
+    print_summary(summary, info.eyes);
     fmt::print("report: {}\n", (folder / "report.html").string());
   }
   return 0;

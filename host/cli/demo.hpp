@@ -15,6 +15,7 @@ struct DemoOptions {
   std::string hand;                 // empty: the experiment's own
   std::filesystem::path out;        // empty: runs/<time>
   bool lockstep{};                  // on the bench instead of processes
+  bool camera{true};                // over the simulated phantom, where the plant has one
   bool own_rig{true};               // start plant and controller; false: they run already
   bool json{};
   std::int64_t domain = -1;  // DDS domain instead of the rig file's

@@ -69,6 +69,8 @@ int main(int argc, char** argv) {
       ->excludes(which);
   demo_command->add_option("--hand", demo.hand, "who holds the simulated rig's handle, instead of the experiment's: hand name, or path");
   demo_command->add_flag("--lockstep", demo.lockstep, "on the bench: one process, virtual clock, repeatable to the bit");
+  demo_command->add_flag_callback(
+      "--no-camera", [&] { demo.camera = false; }, "without the camera over the phantom, its tracked markers and their files");
   demo_command->add_option("--seed", demo.seed, "of the simulated noise")->capture_default_str();
   demo_command->callback([&] {
     demo.domain = domain;

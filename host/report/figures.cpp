@@ -181,6 +181,25 @@ std::string tracking_script(const RunInfo& run, std::span<const Sample> samples)
              seconds(samples.front()), seconds(samples.back()), palette[5], palette[0], shade_keys(run));
 }
 
+std::string markers_script(const Eyes& eyes) {
+  std::string block = "$markers << EOD\n";
+  bool known = false;
+  for (const SeenFrame& f : eyes.course) {
+    known = known || std::isfinite(f.error_px);
+    block += fmt::format("{:.6g} {:.5g} {:.5g}\n", f.t_s, 1e3 * f.displacement_m, f.error_px);
+  }
+  return head("markers", 900, 420) + block +
+         fmt::format(
+             "EOD\nset xlabel 'time [s]'\nset ylabel 'mean displacement of the markers [mm]'\nset autoscale xfix\nset yrange [0:*]\n"
+             "set key top left Left reverse samplen 2\n{1}plot $markers using 1:2 with lines lw 2 lc rgb '{0}' title "
+             "'displacement'{2}\n",
+             palette[0],
+             known ? "set border 11 lc rgb '#555555'\nset rmargin 10\nset y2tics out scale 0.6 textcolor rgb '#333333'\nset y2range [0:*]\n"
+                     "set y2label 'tracked less true place, rms [px]'\n"
+                   : "",
+             known ? fmt::format(", $markers using 1:3 axes x1y2 with lines lw 1.5 lc rgb '{}' title 'error (right)'", palette[3]) : "");
+}
+
 std::string overview_script(const RunInfo& run, std::span<const Sample> samples) {
   // A run that ended before homing has no poses, and gnuplot refuses a curve without a point.
   if (std::ranges::none_of(samples, [&](const Sample& s) { return std::isfinite(tip_depth_m(run, s)); })) return {};
@@ -396,6 +415,11 @@ std::vector<Figure> draw_figures(const RunInfo& run, const Summary& summary, std
     add(overview_script(run, samples),
         {"overview.svg", "The run", "Depth of the tip and force along the needle, means in slices of time."});
   }
+  if (run.eyes)
+    add(markers_script(*run.eyes),
+        {"markers.svg", "Markers against time",
+         run.eyes->error ? "Mean displacement of the markers, and how far the tracked places are off the true ones."
+                         : "Mean displacement of the markers."});
   add(histogram_script("tick_time", "execution time of the tick", samples, summary.tick_us,
                        [](const Sample& s) { return static_cast<double>(s.tick_us); }),
       {"tick_time.svg", "Tick time", "How long the controller computed in each tick. Both axes are logarithmic."});

@@ -209,6 +209,42 @@ std::string counts_table(const Summary& s) {
   return table({"Recording", ""}, rows);
 }
 
+std::string eyes_table(const Eyes& e) {
+  std::string rows;
+  rows += row({"Frames", fmt::format("{} of {} markers; {} lost, {} dropped", e.frames, e.markers, e.lost, e.dropped)});
+  rows += row({"Markers not seen", fmt::format("{} of {} places", e.not_seen, e.frames * e.markers)});
+  rows += row({"Greatest displacement of a marker", millimetres(e.most_displacement_m, 2)});
+  rows += row({"Time of tracking, a frame",
+               fmt::format("median {}, 99&nbsp;% {}", number(1e3 * e.track_s_p50, 1, "ms"), number(1e3 * e.track_s_p99, 1, "ms"))});
+  rows +=
+      row({"Time of a frame",
+           e.clock == "rig" ? "on the rig's clock" +
+                                  (e.time_uncertainty_s > 0.0 ? ", held to " + number(1e6 * e.time_uncertainty_s, 0, "µs") : std::string())
+                            : "on the clock \"" + escaped(e.clock) + "\", which is not the rig's"});
+  if (e.error) {
+    rows += row({"Tracked less true place, in the image",
+                 fmt::format("{} rms, {} at most", number(e.error->rms_px, 3, "px"), number(e.error->worst_px, 2, "px"))});
+    rows += row({"Tracked less true place, in the phantom's plane",
+                 fmt::format("{} rms, {} at most", micrometres(e.error->rms_m), micrometres(e.error->worst_m))});
+  }
+  return table({"Camera", ""}, rows);
+}
+
+// RFC 4648: a picture within the page, which stays one file.
+std::string base64(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t have = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t three = 0;
+    for (std::size_t k = 0; k < 3; ++k) three = (three << 8U) | (k < have ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) out += k <= have ? digits[(three >> (18U - 6U * k)) & 63U] : '=';
+  }
+  return out;
+}
+
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
   for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
 }
@@ -235,7 +271,7 @@ h1 { font-size: 1.6rem; margin-bottom: 0.2rem; } h2 { font-size: 1.15rem; margin
 th { text-align: left; font-weight: 600; border-bottom: 2px solid #555; } td, th { padding: 0.3rem 0.8rem 0.3rem 0; vertical-align: top; }
 td { border-bottom: 1px solid #ddd; } small, .none, figcaption, .sub { color: #666; }
 .n { white-space: nowrap; }
-figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: 0.9rem; }
+figure { margin: 1rem 0; } figure svg, figure img { width: 100%; height: auto; } figcaption { font-size: 0.9rem; }
 )";
 
 std::string page(const RunInfo& run, const Summary& summary, const std::vector<Figure>& figures, const fs::path& drawn) {
@@ -264,6 +300,19 @@ std::string page(const RunInfo& run, const Summary& summary, const std::vector<F
     figure("tracking.svg");
     out += "<h2>Course of the run</h2>\n";
     figure("overview.svg");
+  }
+  if (run.eyes) {
+    out += "<h2>What the camera saw</h2>\n";
+    if (!run.eyes->picture.empty())
+      out += fmt::format(
+          "<figure>\n<img alt=\"markers of the phantom and their displacements\" "
+          "src=\"data:image/jpeg;base64,{}\">\n<figcaption><b>Markers "
+          "of the phantom.</b> The frame in which they are furthest from the first one; crosses where they were found, arrows from where "
+          "they "
+          "were then. As figure 3.7&nbsp;(b) of the thesis.</figcaption>\n</figure>\n",
+          base64(run.eyes->picture));
+    out += eyes_table(*run.eyes);
+    figure("markers.svg");
   }
   out += "<h2>Timing</h2>\n" + timing_table(run, summary) + machine_table(run);
   figure("tick_time.svg");

@@ -112,6 +112,27 @@ std::string json(const Sag& s) {
                  {"expected_command_m", number(s.expected_command_m)}});
 }
 
+std::string json(const Eyes& e) {
+  const std::string error = !e.error ? "null"
+                                     : object({{"places", std::to_string(e.error->places)},
+                                               {"rms_px", number(e.error->rms_px)},
+                                               {"worst_px", number(e.error->worst_px)},
+                                               {"rms_m", number(e.error->rms_m)},
+                                               {"worst_m", number(e.error->worst_m)}});
+  return object({{"source", text(e.source)},
+                 {"clock", text(e.clock)},
+                 {"time_uncertainty_s", number(e.time_uncertainty_s)},
+                 {"frames", std::to_string(e.frames)},
+                 {"frames_lost", std::to_string(e.lost)},
+                 {"frames_dropped", std::to_string(e.dropped)},
+                 {"markers", std::to_string(e.markers)},
+                 {"markers_not_seen", std::to_string(e.not_seen)},
+                 {"most_displacement_m", number(e.most_displacement_m)},
+                 {"track_s_p50", number(e.track_s_p50)},
+                 {"track_s_p99", number(e.track_s_p99)},
+                 {"error", error}});
+}
+
 }  // namespace
 
 std::string to_json(const RunInfo& run, const Summary& s) {
@@ -143,6 +164,7 @@ std::string to_json(const RunInfo& run, const Summary& s) {
   members.emplace_back("tick_us", json(s.tick_us));
   members.emplace_back("wakeup_late_us", json(s.wakeup_late_us));
   members.emplace_back("machine", run.machine ? json(*run.machine) : "null");
+  members.emplace_back("camera", run.eyes ? json(*run.eyes) : "null");
   members.emplace_back("notes", array(run.notes, [](const std::string& n) { return text(n); }));
   return object(members) + "\n";
 }

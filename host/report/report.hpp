@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "common/core/contracts.hpp"
+#include "host/report/eyes.hpp"
 
 namespace trocar::report {
 
@@ -59,6 +60,7 @@ struct RunInfo {
   double kp_n_per_m{};                  // its proportional gain; 0: no sag is reported
   std::vector<Truth> truth;             // increasing ticks; empty for a rig that is no lock-step simulation
   std::optional<Machine> machine;       // none in lock-step
+  std::optional<Eyes> eyes;             // when a camera watched
   std::vector<std::string> notes;
 };
 
