@@ -26,11 +26,11 @@ struct Frame {
   std::uint64_t number{};  // the camera's count; a gap is a frame that was lost
   // Middle of the exposure of the image's middle row. Which clock, its source says.
   std::int64_t time_ns{};
-  std::int64_t time_uncertainty_ns{};  // of an estimated time (host/camera/rig_clock.hpp), else 0
-  std::int64_t arrived_ns{};           // when this process had it, CLOCK_MONOTONIC; 0 for files
   int width_px{}, height_px{};
   PixelFormat format{PixelFormat::Mono8};
   std::vector<std::uint8_t> pixels{};  // row by row from the top, without padding; width * height * channels bytes
+  std::int64_t time_uncertainty_ns{};  // of an estimated time (host/camera/rig_clock.hpp), else 0
+  std::int64_t arrived_ns{};           // when this process had it, CLOCK_MONOTONIC; 0 for files
 };
 
 }  // namespace trocar::optics

@@ -194,7 +194,14 @@ int run_processes(const DemoOptions& options, const host::ExperimentSetup& setup
     recorder->signal(SIGINT);
     recorder->wait(end_s);
     std::error_code ignored;
-    std::filesystem::remove(out / "capture.mcap", ignored);  // nothing was run: a recording of it would be half a result
+    // Nothing was run: a recording of it would be half a result.
+    camera.reset();
+    if (plant) {
+      plant->signal(SIGTERM);  // it removes its own unfinished files
+      plant->wait(end_s);
+    }
+    for (const char* name : {"capture.mcap", "markers.csv", "markers.toml", "markers.jpg", "markers_truth.csv"})
+      std::filesystem::remove(out / name, ignored);
     throw;
   }
   line.end();

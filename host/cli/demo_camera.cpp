@@ -15,7 +15,6 @@
 namespace trocar::cli {
 namespace {
 
-constexpr double ready_s = 20.0;
 constexpr double end_s = 20.0;  // the picture, and what is still in the queue
 
 }  // namespace
@@ -48,7 +47,6 @@ void DemoCamera::start(std::optional<std::uint32_t> domain) {
                                  "--live"};
   if (domain) words.insert(words.end(), {"--domain", std::to_string(*domain), "--threads", "1"});
   tracker_.emplace("trocar-camera", words);
-  if (domain) tracker_->wait_for_line("times are the rig's", ready_s);
 }
 
 void DemoCamera::drain() {

@@ -22,7 +22,7 @@ class DemoCamera {
 
   [[nodiscard]] std::string socket() const { return (folder_ / "camera").string(); }
   [[nodiscard]] std::string truth() const { return (out_ / "markers_truth.csv").string(); }
-  // Once the simulation serves its camera. With a domain: on the rig's clock, published there; returns when both are known.
+  // Once the simulation serves its camera. With a domain: on the clock of the rig there, and published.
   void start(std::optional<std::uint32_t> domain);
   void drain();  // now and then, so that what it says finds room
   // After the simulation has ended, or (live) before: false when it failed, which is then said.

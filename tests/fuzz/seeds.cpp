@@ -91,6 +91,15 @@ int main(int argc, char** argv) {
   write_cdr("status", 2, capture::serialise(wire::Status{}));
   write_cdr("event", 3, capture::serialise(wire::to_wire(Event{.tick = 3, .kind = EventKind::Homed}, "homed")));
   write_cdr("command", 4, capture::serialise(wire::to_wire(Command{.session = 7, .kind = CommandKind::Move}, "stiff", 1, 100)));
+  std::array<float, 6> places{1.0F, 2.0F, 3.0F, 4.0F, 5.0F, 6.0F};
+  wire::Markers markers{};
+  markers.rows = 2;
+  markers.columns = 3;
+  for (auto* sequence : {&markers.u_px, &markers.v_px, &markers.x_m}) {
+    sequence->_buffer = places.data();
+    sequence->_length = sequence->_maximum = static_cast<std::uint32_t>(places.size());
+  }
+  write_cdr("markers", 6, capture::serialise(markers));
   write_cdr("reply", 5, capture::serialise(wire::to_wire(Reply{.session = 7, .id = 1}, "done")));
   std::filesystem::create_directories(folder / "mcap");
   write_capture(folder / "mcap" / "whole");

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/capture/rig_capture.hpp"
+#include "common/wire/topics.hpp"
 #include "harness.hpp"
 
 namespace trocar::testing {
@@ -70,6 +71,49 @@ TEST(Demo, LeavesAReportAndNoProcess) {
   const std::string csv = read_text(run / "samples.csv");
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), log.samples.size() + 1);
   EXPECT_NE(program.out().find((run / "report.html").string()), std::string::npos) << program.out();
+  // Its eyes: tracked on the rig's clock, recorded, and in the report beside the truth.
+  const std::string summary = read_text(run / "markers.toml");
+  EXPECT_NE(summary.find("clock = \"rig\""), std::string::npos) << summary;
+  EXPECT_TRUE(log.messages.contains(wire::markers_topic.name));
+  EXPECT_NE(report.find("What the camera saw"), std::string::npos);
+  EXPECT_NE(report.find("data:image/jpeg;base64,"), std::string::npos);
+  EXPECT_NE(report.find("Tracked less true place"), std::string::npos);
+  EXPECT_NE(program.out().find("camera: "), std::string::npos) << program.out();
+}
+
+// The camera's part in lock-step: every frame is tracked, and the same bytes come twice.
+TEST(Demo, SeesTheSameTwiceInLockStep) {
+  const Scratch scratch;
+  const auto arguments = [&](const char* out, const char* experiment) {
+    return std::vector<std::string>{"demo",     "--lockstep", "--json", "--experiment",          experiment,
+                                    "--speeds", "20",         "--out",  (scratch / out).string()};
+  };
+  (void)scratch.make_rig();
+  const std::string experiment = scratch.make_experiment().string();
+  std::string seen[2];
+  for (int k = 0; k < 2; ++k) {
+    const std::string out = k == 0 ? "first" : "again";
+    Program program(scratch, "trocar", arguments(out.c_str(), experiment.c_str()));
+    ASSERT_EQ(program.wait(demo_s), 0) << program.errors();
+    EXPECT_NE(program.out().find("\"frames_lost\": 0, \"frames_dropped\": 0"), std::string::npos) << program.out();
+    const std::size_t error = program.out().find("\"rms_px\": ");
+    ASSERT_NE(error, std::string::npos) << program.out();
+    EXPECT_LT(std::stod(program.out().substr(error + 10)), 0.05);
+    seen[k] = read_text(scratch / out / "markers.csv");
+  }
+  EXPECT_GT(seen[0].size(), 100'000U);
+  EXPECT_TRUE(seen[0] == seen[1]);  // not EXPECT_EQ: nobody reads megabytes
+}
+
+TEST(Demo, GoesBlindWhenItIsTold) {
+  const Scratch scratch;
+  (void)scratch.make_rig();
+  Program program(scratch, "trocar",
+                  {"demo", "--lockstep", "--no-camera", "--experiment", scratch.make_experiment().string(), "--speeds", "20", "--out",
+                   (scratch / "run").string()});
+  ASSERT_EQ(program.wait(demo_s), 0) << program.errors();
+  EXPECT_FALSE(std::filesystem::exists(scratch / "run/markers.csv"));
+  EXPECT_EQ(read_text(scratch / "run/report.html").find("What the camera saw"), std::string::npos);
 }
 
 TEST(Demo, EndsCleanlyOnCtrlC) {

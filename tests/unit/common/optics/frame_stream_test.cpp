@@ -30,7 +30,12 @@ class FrameStream : public ::testing::Test {
   }
   ~FrameStream() override { std::filesystem::remove_all(folder_); }
   static Frame frame(std::uint64_t number, int width = 320, int height = 200, PixelFormat format = PixelFormat::Mono8) {
-    Frame f{number, static_cast<std::int64_t>(number) * 1000, width, height, format, {}};
+    Frame f;
+    f.number = number;
+    f.time_ns = static_cast<std::int64_t>(number) * 1000;
+    f.width_px = width;
+    f.height_px = height;
+    f.format = format;
     f.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * channels(format));
     for (std::size_t k = 0; k < f.pixels.size(); ++k) f.pixels[k] = static_cast<std::uint8_t>(k * 7 + number);
     return f;
@@ -145,7 +150,7 @@ TEST_F(FrameStream, WhatIsNoFrameIsForeignAndHalfAFrameBroken) {
   const Impostor server(socket_);
   const auto hears = [&](const std::vector<std::byte>& bytes) {
     std::vector<std::byte> all = greeting("trcamer1", 2);
-    all.insert(all.end(), bytes.begin(), bytes.end());
+    for (const std::byte b : bytes) all.push_back(b);
     const auto said = std::async(std::launch::async, [&] { server.say(all); });
     FrameClient client(socket_, 5s);
     EXPECT_EQ(client.clock(), Clock::Rig);
