@@ -139,6 +139,12 @@ TEST_F(TrackCommand, RefusesWhatCannotBe) {
   expect_refusal(scratch, "trocar-bench", {"--experiment", "haptic", "--out", path("run"), "--camera-socket", path("socket")},
                  {"no tissue"});
   EXPECT_FALSE(std::filesystem::exists(scratch / "run"));
+  const std::string rig = scratch.make_rig().string();
+  expect_refusal(scratch, "trocar-plant", {"--rig", rig, "--no-tissue", "--camera-socket", path("socket")}, {"no tissue to look at"});
+  expect_refusal(scratch, "trocar-plant", {"--rig", rig, "--plant", "ubc_twin_haptic", "--camera-socket", path("socket")}, {"no [camera]"});
+  expect_refusal(scratch, "trocar-plant", {"--rig", rig, "--camera-socket", path("socket"), "--camera-truth", path("nowhere/truth.csv")},
+                 {"nowhere"});
+  EXPECT_FALSE(std::filesystem::exists(scratch / "socket"));
   expect_refusal(scratch, "trocar", {"camera", "render", "--out", path("frames")}, {"frames: is there already"});
   std::string folding = small_camera;
   folding.replace(folding.find("-0.268"), 6, "-2.268");
