@@ -31,7 +31,7 @@ class Line {
   Line& scientific(double x) noexcept {
     if (x != x) return text("nan    ");
     if (x == 0.0) return text("0      ");
-    if (x > 1e300) return text("inf    ");
+    if (x - x != 0.0) return text("inf    ");
     int exponent = 0;
     while (x >= 10.0) x /= 10.0, ++exponent;
     while (x < 1.0) x *= 10.0, --exponent;

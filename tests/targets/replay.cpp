@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "tests/targets/line.hpp"
 
@@ -10,12 +11,36 @@ namespace {
 
 using Name = std::array<char, 24>;
 
-// Largest error allowed, relative to the quantity's largest value in the case. README.md says where they come from.
-struct Bound {
-  double float64;
-  double float32;
+// Largest error allowed, relative to the quantity's largest value in the case. In float64 it is the same for all. In float32 it is what is
+// left of single precision's 6e-8:
+//   tick      a joint angle of 2 rad is rounded by 1e-7 rad, an encoder's resolution aside; the velocity observers (300 rad/s) make 4e-5 rad/s
+//             of it, damping gains some 1e-3 of the largest forces
+//   contact   a place 0.25 m from the origin is rounded by 1.5e-8 m, 4e-6 N over a contact's own compliance of 4e-3 m/N; the solver ends
+//             below 1e-4 N (contact/solver.hpp), a thousandth of the largest lateral force
+//   bending   the same 1e-4 N (insertion/flexible.hpp), over lateral forces of 0.014 N
+//   beam      angles of 2 rad, summed over the nodes
+constexpr double float64_bound = 1e-12;
+struct Float32Bound {
+  std::string_view name;
+  double bound;
 };
-constexpr Bound bound_of(const Name&) noexcept { return {1e-12, 1e-2}; }
+constexpr std::array<Float32Bound, 6> float32_bounds{{{"tick, position", 2e-3},
+                                                      {"tick, haptic", 2e-3},
+                                                      {"contact, embedded", 1e-3},
+                                                      {"contact, adapt", 1e-3},
+                                                      {"bending needle", 1e-2},
+                                                      {"beam", 3e-4}}};
+constexpr bool is_float64 = std::is_same_v<Scalar, double>;
+// What float32 may decide a step earlier or later, in so many of a hundred vectors. Such a vector's values are not compared: they differ by
+// that step.
+constexpr std::uint64_t decisions_per_hundred = is_float64 ? 0 : 2;
+
+double bound_of(std::string_view name) noexcept {
+  if (is_float64) return float64_bound;
+  for (const Float32Bound& known : float32_bounds)
+    if (name == known.name) return known.bound;
+  return 0.0;
+}
 
 double error_of(double value, double expected, double scale) noexcept {
   if (std::isnan(value) && std::isnan(expected)) return 0.0;
@@ -47,6 +72,8 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
     answer = {};
     fresh.step(in, answer, platform.now);
     std::size_t i = 0;
+    double error = 0.0;
+    const char* where = "-";
     for (std::size_t q = 0; q < Case::quantities.size(); ++q)
       for (std::size_t c = 0; c < Case::quantities[q].size; ++c, ++i) {
         double expected{};
@@ -55,11 +82,10 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
           // NaN where there is nothing yet, as before Haptic: then there must be none.
           expected = std::isnan(expected) ? 0.0 : expected + 2.0 * bound * scale[q];
         }
-        const double error = error_of(answer.value[i], expected, scale[q]);
-        if (error > found.error) {
-          found.error = error;
-          found.where = Case::quantities[q].name;
-          found.at = k;
+        const double difference = error_of(answer.value[i], expected, scale[q]);
+        if (difference > error) {
+          error = difference;
+          where = Case::quantities[q].name;
         }
       }
     bool differs = false;
@@ -70,6 +96,11 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
       differs = differs || expected != answer.decision[d];
     }
     if (differs) ++found.decisions;
+    if (error > found.error && (!differs || is_float64)) {
+      found.error = error;
+      found.where = where;
+      found.at = k;
+    }
     found.cost_least = std::min(found.cost_least, answer.cost);
     found.cost_most = std::max(found.cost_most, answer.cost);
     found.cost_sum += answer.cost;
@@ -82,7 +113,6 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
 bool replay(std::span<const std::byte> golden, std::span<const std::byte> image_bytes, Memory& memory, const Platform& platform,
             Wrong wrong) noexcept {
   Line line;
-  constexpr bool is_float64 = std::is_same_v<Scalar, double>;
   platform.print(line.text(platform.name).text(is_float64 ? ", float64" : ", float32").end());
   model::Image image{};
   if (!open_image(image_bytes, memory, image)) {
@@ -102,15 +132,14 @@ bool replay(std::span<const std::byte> golden, std::span<const std::byte> image_
     in(kind);
     if (kind == Kind::End || !in.ok()) break;
     for (char& c : name) in(c);
-    const double bound = is_float64 ? bound_of(name).float64 : bound_of(name).float32;
+    const double bound = bound_of(name.data());
     Found found;
     bool whole = false;
     const bool known =
         with_case(kind, [&](auto& fresh) { whole = run(fresh, in, memory, image, platform, wrong, bound, found); });
     if (!known || !whole) break;
     ++cases;
-    // A float32 build may decide a step earlier or later; what that does to the values is within the bound.
-    const bool passed = found.vectors > 0 && found.error <= bound && (!is_float64 || found.decisions == 0);
+    const bool passed = found.vectors > 0 && found.error <= bound && 100 * found.decisions <= decisions_per_hundred * found.vectors;
     good = good && passed;
     line.text(name.data(), 18).number(found.vectors, 7).text("  ").scientific(found.error).text("  ").scientific(bound).text("  ");
     line.number(found.at, 5).text(" ").text(found.where, 27).number(found.decisions, 9);

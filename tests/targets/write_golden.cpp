@@ -204,9 +204,14 @@ void add_haptic(Writer& out, const model::Image& image) {
   loop->tick(20);
   const auto at = loop->bench.plant().physics().pose();
   const double now_s = 1e-9 * static_cast<double>(loop->bench.now_ns());
-  loop->hand.want({{now_s, at}, {now_s + 0.5, {at[0] + 0.002, at[1] + 0.03, at[2] + 0.03}}, {now_s + 1.0, at}});
+  // Turned in the air and back, pushed 30 mm in, a little aside and turning, and most of the way out again.
+  loop->hand.want({{now_s, at},
+                   {now_s + 0.2, {at[0], at[1] - 0.01, at[2] + 0.25}},
+                   {now_s + 0.4, at},
+                   {now_s + 0.8, {at[0] + 0.002, at[1] + 0.03, at[2] + 0.03}},
+                   {now_s + 1.2, at}});
   for (const Display display : {Display::FourChannel, Display::Impedance, Display::Admittance})
-    loop->send({.kind = CommandKind::Haptic, .display = display}, 250);
+    loop->send({.kind = CommandKind::Haptic, .display = display}, 350);
   loop->expect(Mode::Haptic);
   add(out, "tick, haptic", *loop, image);
 }
