@@ -17,7 +17,7 @@ namespace trocar::targets {
 
 using Scalar = decltype(needle::Pose::x_m);  // double, or float where the sources are compiled so
 
-// What has unit and scale in common; an error is measured against the largest value that the quantity takes in its case.
+// Numbers that have unit and scale in common, as a vector's components; an error is measured against the largest one in the case.
 struct Quantity {
   const char* name;
   std::size_t size;
@@ -25,7 +25,9 @@ struct Quantity {
 
 inline constexpr std::size_t most_values = 64;
 inline constexpr std::size_t most_decisions = 16;
-inline constexpr std::size_t most_quantities = 14;
+inline constexpr std::size_t most_quantities = 11;
+// A moment is compared as a force at the needle's end: it is the difference of forces on such levers.
+inline constexpr Scalar lever_m = static_cast<Scalar>(0.1);
 
 struct Answer {
   std::array<double, most_values> value{};
@@ -38,6 +40,7 @@ struct Answer {
   void values_of(const T&... more) {
     (add(more), ...);
   }
+  void wrench_of(Scalar fx_n, Scalar fy_n, Scalar moment_nm) { values_of(fx_n, fy_n, moment_nm / lever_m); }
   void decide(std::int64_t what) { decision[decisions++] = what; }
 
  private:
@@ -73,19 +76,16 @@ T& begin(std::span<std::byte> place, Arguments&&... arguments) {
 // The controller's tick on what the machine said. With a needle, the model of Haptic mode runs in it.
 class TickCase {
  public:
-  static constexpr std::array<Quantity, 14> quantities{{{"joint torque", 4},
+  static constexpr std::array<Quantity, 11> quantities{{{"joint torque", 4},
                                                         {"position", 2},
                                                         {"angle", 1},
                                                         {"velocity", 2},
                                                         {"angular velocity", 1},
                                                         {"set point", 2},
                                                         {"set point's angle", 1},
-                                                        {"force asked for", 2},
-                                                        {"moment asked for", 1},
-                                                        {"hand's force", 2},
-                                                        {"hand's moment", 1},
-                                                        {"virtual needle's force", 2},
-                                                        {"virtual needle's moment", 1},
+                                                        {"wrench asked for", 3},
+                                                        {"hand's wrench", 3},
+                                                        {"virtual needle's wrench", 3},
                                                         {"display's energy", 1}}};
 
   void open(Reader& in, Memory& memory, const model::Image& image) {
@@ -117,8 +117,10 @@ class TickCase {
     Event event;
     while (mail_->events.pop(event)) last_event_ = event;
     const Sample& s = controller_->sample();
-    out.values_of(command.joint_torque_nm, s.pose, s.velocity, s.setpoint_pose, s.wrench_command, s.handle_wrench, s.virtual_wrench,
-                  s.display_energy_j);
+    out.values_of(command.joint_torque_nm, s.pose, s.velocity, s.setpoint_pose);
+    for (const auto* wrench : {&s.wrench_command, &s.handle_wrench, &s.virtual_wrench})
+      out.wrench_of((*wrench)[0], (*wrench)[1], (*wrench)[2]);
+    out.values_of(s.display_energy_j);
     for (const std::int64_t what :
          {static_cast<std::int64_t>(command.request), static_cast<std::int64_t>(s.mode), static_cast<std::int64_t>(s.fault),
           static_cast<std::int64_t>(s.moving), static_cast<std::int64_t>(last_reply_.id), static_cast<std::int64_t>(last_reply_.code),
@@ -139,13 +141,8 @@ class TickCase {
 class InsertionCase {
  public:
   static constexpr std::size_t contacts = 10;  // that are looked at
-  static constexpr std::array<Quantity, 7> quantities{{{"base force", 2},
-                                                       {"base moment", 1},
-                                                       {"tip", 2},
-                                                       {"tip angle", 1},
-                                                       {"path", 1},
-                                                       {"axial contact force", contacts},
-                                                       {"lateral contact force", contacts}}};
+  static constexpr std::array<Quantity, 5> quantities{
+      {{"base wrench", 3}, {"tip", 2}, {"tip angle", 1}, {"path", 1}, {"contact force", 2 * contacts}}};
 
   void open(Reader& in, Memory& memory, const model::Image& image) {
     memory.image = image;
@@ -164,8 +161,8 @@ class InsertionCase {
     const std::uint64_t begin = now();
     const insertion::Result result = insertion_->step(pose, dt_s);
     out.cost = now() - begin;
-    out.values_of(result.base.fx_n, result.base.fy_n, result.base.tau_nm, result.tip.x_m, result.tip.y_m, result.tip.theta_rad,
-                  result.path_m);
+    out.wrench_of(result.base.fx_n, result.base.fy_n, result.base.tau_nm);
+    out.values_of(result.tip.x_m, result.tip.y_m, result.tip.theta_rad, result.path_m);
     std::array<Scalar, contacts> axial_n{}, lateral_n{};
     std::int64_t states = 0;
     for (std::size_t i = 0; i < std::min(insertion_->contacts(), contacts); ++i) {
@@ -188,8 +185,8 @@ class InsertionCase {
 class BeamCase {
  public:
   static constexpr std::size_t loads = 8;
-  static constexpr std::array<Quantity, 6> quantities{
-      {{"tip", 2}, {"tip angle", 1}, {"position", 2 * loads}, {"base force", 2}, {"base moment", 1}, {"flexibility", 4 * loads}}};
+  static constexpr std::array<Quantity, 5> quantities{
+      {{"tip", 2}, {"tip angle", 1}, {"position", 2 * loads}, {"base wrench", 3}, {"flexibility", 4 * loads}}};
 
   void open(Reader& in, Memory& memory, const model::Image&) {
     needle::Properties properties;
@@ -211,7 +208,7 @@ class BeamCase {
     out.values_of(tip.position_m, tip.theta_rad);
     for (std::size_t i = 0; i < loads; ++i) out.values_of(beam_->position_m(i));
     const needle::Wrench reaction = beam_->reaction();
-    out.values_of(reaction.fx_n, reaction.fy_n, reaction.tau_nm);
+    out.wrench_of(reaction.fx_n, reaction.fy_n, reaction.tau_nm);
     for (std::size_t i = 0; i < loads; ++i) out.values_of(beam_->compliance(i, loads - 1));
     out.decide(static_cast<std::int64_t>(result.status));
     out.decide(static_cast<std::int64_t>(factor.status));

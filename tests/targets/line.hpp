@@ -27,7 +27,7 @@ class Line {
     while (count > 0) put(digits[--count]);
     return *this;
   }
-  // As 1.2e-13, rounded up, not negative.
+  // As 1.2e-13, rounded up beyond a thousandth, not negative.
   Line& scientific(double x) noexcept {
     if (x != x) return text("nan    ");
     if (x == 0.0) return text("0      ");
@@ -36,7 +36,7 @@ class Line {
     while (x >= 10.0) x /= 10.0, ++exponent;
     while (x < 1.0) x *= 10.0, --exponent;
     auto tenths = static_cast<std::uint64_t>(10.0 * x);
-    if (static_cast<double>(tenths) < 10.0 * x) ++tenths;
+    if (10.0 * x - static_cast<double>(tenths) > 1e-2) ++tenths;
     if (tenths > 99) tenths /= 10, ++exponent;
     number(tenths / 10).text(".").number(tenths % 10).text("e").text(exponent < 0 ? "-" : "+");
     const auto size = static_cast<std::uint64_t>(exponent < 0 ? -exponent : exponent);
