@@ -16,11 +16,11 @@ using Name = std::array<char, 24>;
 //   tick      a joint angle of 2 rad is rounded by 1e-7 rad, an encoder's resolution aside; the velocity observers (300 rad/s) make 4e-5 rad/s
 //             of it, damping gains some 1e-3 of the largest forces
 //   contact   a place 0.25 m from the origin is rounded by 1.5e-8 m, 4e-6 N over a contact's own compliance of 4e-3 m/N; the solver ends
-//             below 1e-4 N (contact/solver.hpp), a thousandth of the largest lateral force
+//             below 1e-4 N (contact/solver.hpp), over forces of 0.36 N
 //   adapt     where the tip springs back as a node is moved onto its way, the crossing may be found a step of the base, 0.16 mm, earlier or
-//             later: half of it at the tip's 68 N/m over 0.54 N
-//   bending   the same 1e-4 N (insertion/flexible.hpp) for tissue and needle each, over lateral forces of 0.014 N at a lever of 0.1 m
-//   beam      angles of 2 rad, summed over the nodes
+//             later: half of it at the tip's 68 N/m, over 0.54 N
+//   bending   twice as much as contact: tissue and needle each end below 1e-4 N (insertion/flexible.hpp)
+//   beam      Newton ends below 1e-5 rad of the last step, so rounding alone is left: angles of 2 rad, some hundred terms
 constexpr double float64_bound = 1e-12;
 struct Float32Bound {
   std::string_view name;
@@ -28,9 +28,9 @@ struct Float32Bound {
 };
 constexpr std::array<Float32Bound, 6> float32_bounds{{{"tick, position", 2e-3},
                                                       {"tick, haptic", 2e-3},
-                                                      {"contact, embedded", 1e-3},
+                                                      {"contact, embedded", 3e-4},
                                                       {"contact, adapt", 1e-2},
-                                                      {"bending needle", 1e-3},
+                                                      {"bending needle", 6e-4},
                                                       {"beam", 3e-4}}};
 constexpr bool is_float64 = std::is_same_v<Scalar, double>;
 // What float32 may decide a step earlier or later, in so many of a hundred vectors. Such a vector's values are not compared: they differ by
@@ -80,10 +80,7 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
       for (std::size_t c = 0; c < Case::quantities[q].size; ++c, ++i) {
         double expected{};
         in(expected);
-        if (wrong == Wrong::Value && k == 0 && q + 1 == Case::quantities.size()) {
-          // NaN where there is nothing yet, as before Haptic: then there must be none.
-          expected = std::isnan(expected) ? 0.0 : expected + 2.0 * bound * scale[q];
-        }
+        if (wrong == Wrong::Value && k == 0 && q == 0) expected += 2.0 * bound * scale[q];
         const double difference = error_of(answer.value[i], expected, scale[q]);
         if (difference > error) {
           error = difference;
@@ -94,7 +91,7 @@ bool run(Case& fresh, Reader& in, Memory& memory, const model::Image& image, con
     for (std::size_t d = 0; d < answer.decisions; ++d) {
       std::int64_t expected{};
       in(expected);
-      if (wrong == Wrong::Decision && k == 0 && d == 0) ++expected;
+      if (wrong == Wrong::Decision && d == 0 && 100 * k <= decisions_per_hundred * found.vectors) ++expected;
       differs = differs || expected != answer.decision[d];
     }
     if (differs) ++found.decisions;

@@ -9,7 +9,8 @@
 
 namespace trocar::targets {
 
-// What is made wrong in the first vector of every case, to see that it is noticed.
+// What is made wrong in every case, to see that it is noticed: a value of the first vector by twice its bound, or one decision more than may
+// differ.
 enum class Wrong : std::uint8_t { Nothing, Value, Decision };
 
 struct Platform {

@@ -2,11 +2,13 @@
 //   vectors.golden   what is asked and answered, case by case (golden.hpp, replay.cpp)
 //   float64.image    the model image, as trocar scene compile makes it
 //   float32.image    the same for a build in float32
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -267,7 +269,11 @@ void add_beam(Writer& out, const model::Image& image) {
   add<BeamCase>(out, "beam", Kind::Beam, image, beginning, vectors);
 }
 
+// An unchanged file keeps its time, and what was built of it stays.
 void write(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+  std::ifstream in(file, std::ios::binary);
+  const std::vector<char> there{std::istreambuf_iterator<char>(in), {}};
+  if (std::ranges::equal(std::as_bytes(std::span(there)), bytes)) return;
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
