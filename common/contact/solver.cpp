@@ -12,8 +12,8 @@ constexpr double inner_tolerance_n = tolerance(1e-11, 3e-6);  // aimed at, so th
 // largest force's last digit, and never near to the promised residual.
 constexpr double rounding_digits = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double largest_inner_tolerance_n = 0.3 * Solver::tolerance_n;
-constexpr double settled_n = tolerance(1e-13, 1e-7);           // at or below, the last forces are the solution of this tick too
-constexpr double largest_slip_start_n = 1e6;  // a contact that would begin by slipping under more begins stuck
+constexpr double settled_n = tolerance(1e-13, 1e-7);  // at or below, the last forces are the solution of this tick too
+constexpr double largest_slip_start_n = 1e6;          // a contact that would begin by slipping under more begins stuck
 constexpr int most_refinements = 3;
 constexpr int block_patience = 3;  // block exchanges without fewer violations
 constexpr double infinity = std::numeric_limits<double>::infinity();

@@ -68,8 +68,8 @@ class Solver {
  public:
   static constexpr std::size_t capacity = capacity::contacts;
   static constexpr double tolerance_n = tolerance(1e-9, 1e-4);  // of the residual
-  static constexpr int max_exchanges = 32;     // iterations of block pivoting
-  static constexpr int max_iterations = 256;   // altogether
+  static constexpr int max_exchanges = 32;                      // iterations of block pivoting
+  static constexpr int max_iterations = 256;                    // altogether
   static constexpr int max_pivots = max_exchanges * static_cast<int>(capacity) + max_iterations;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }

@@ -1,7 +1,7 @@
 // Tolerances for the precision that the real-time side is compiled in.
-// It is written in double throughout. For processors whose floating-point unit has single precision alone the same sources are compiled with
-// float in the place of double, word by word (tests/targets/float32.cmake). What cannot follow by itself is a tolerance near the rounding of
-// double: it is named here for both.
+// It is written in double throughout. For processors whose floating-point unit has single precision alone the same sources are compiled
+// with float in the place of double, word by word (tests/targets/float32.cmake). What cannot follow by itself is a tolerance near the
+// rounding of double: it is named here for both.
 #pragma once
 
 namespace trocar {

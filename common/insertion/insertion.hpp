@@ -59,7 +59,7 @@ struct Result {
 
 class Insertion {
  public:
-  static constexpr double speed_filter_s = 0.020;             // low-pass of the speed along the shaft, for the velocity law
+  static constexpr double speed_filter_s = 0.020;  // low-pass of the speed along the shaft, for the velocity law
   static constexpr double explicit_point_tolerance_m = tolerance(1e-9, 1e-6);  // across the shaft, at the first step
 
   // Starts afresh with this model, which must outlive its use here and come from model::open.

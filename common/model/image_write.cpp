@@ -86,9 +86,7 @@ void write_law(const contact::Law& law, std::byte* out) noexcept {
 
 }  // namespace
 
-std::size_t image_size(const Image& image) noexcept {
-  return static_cast<std::size_t>(header_of(blocks(image, {})).total_bytes);
-}
+std::size_t image_size(const Image& image) noexcept { return static_cast<std::size_t>(header_of(blocks(image, {})).total_bytes); }
 
 void write(const Image& image, std::span<std::byte> bytes) noexcept {
   const Parameters parameters = parameters_of(image);

@@ -22,8 +22,7 @@ class Reader {
   explicit Reader(std::span<const std::byte> bytes) noexcept : bytes_(bytes) {}
 
   template <class T>
-    requires(std::is_arithmetic_v<T> || std::is_enum_v<T>)
-  void operator()(T& value) noexcept {
+  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) void operator()(T& value) noexcept {
     if constexpr (std::is_floating_point_v<T>)
       value = static_cast<T>(take<double>());
     else

@@ -32,8 +32,7 @@ int main(int count, char** argument) {
   }
   Wrong wrong = Wrong::Nothing;
   if (count == 4) wrong = std::strcmp(argument[3], "wrong-value") == 0 ? Wrong::Value : Wrong::Decision;
-  const trocar::targets::Platform platform{.print = [](const char* text) { std::fputs(text, stdout); },
-                                           .now = []() -> std::uint64_t { return 0; },
-                                           .name = TROCAR_TARGET};
+  const trocar::targets::Platform platform{
+      .print = [](const char* text) { std::fputs(text, stdout); }, .now = []() -> std::uint64_t { return 0; }, .name = TROCAR_TARGET};
   return trocar::targets::replay(mapped(argument[1]), mapped(argument[2]), memory, platform, wrong) ? 0 : 1;
 }

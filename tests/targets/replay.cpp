@@ -13,7 +13,8 @@ using Name = std::array<char, 24>;
 
 // Largest error allowed, relative to the quantity's largest value in the case. In float64 it is the same for all. In float32 it is what is
 // left of single precision's 6e-8:
-//   tick      a joint angle of 2 rad is rounded by 1e-7 rad, an encoder's resolution aside; the velocity observers (300 rad/s) make 4e-5 rad/s
+//   tick      a joint angle of 2 rad is rounded by 1e-7 rad, an encoder's resolution aside; the velocity observers (300 rad/s) make 4e-5
+//   rad/s
 //             of it, damping gains some 1e-3 of the largest forces
 //   contact   a place 0.25 m from the origin is rounded by 1.5e-8 m, 4e-6 N over a contact's own compliance of 4e-3 m/N; the solver ends
 //             below 1e-4 N (contact/solver.hpp), over forces of 0.36 N
@@ -56,7 +57,7 @@ struct Found {
   std::uint64_t vectors{};
   double error{};
   const char* where{"-"};
-  std::uint64_t at{};  // vector
+  std::uint64_t at{};         // vector
   std::uint64_t decisions{};  // vectors with one that differs
   std::uint64_t cost_least{std::numeric_limits<std::uint64_t>::max()}, cost_most{}, cost_sum{};
 };
@@ -134,8 +135,7 @@ bool replay(std::span<const std::byte> golden, std::span<const std::byte> image_
     const double bound = bound_of(name.data());
     Found found;
     bool whole = false;
-    const bool known =
-        with_case(kind, [&](auto& fresh) { whole = run(fresh, in, memory, image, platform, wrong, bound, found); });
+    const bool known = with_case(kind, [&](auto& fresh) { whole = run(fresh, in, memory, image, platform, wrong, bound, found); });
     if (!known || !whole) break;
     ++cases;
     const bool passed = found.vectors > 0 && found.error <= bound && 100 * found.decisions <= decisions_per_hundred * found.vectors;

@@ -9,13 +9,13 @@
 
 namespace trocar::targets {
 
-// What is made wrong in every case, to see that it is noticed: a value of the first vector by twice its bound, or one decision more than may
-// differ.
+// What is made wrong in every case, to see that it is noticed: a value of the first vector by twice its bound, or one decision more than
+// may differ.
 enum class Wrong : std::uint8_t { Nothing, Value, Decision };
 
 struct Platform {
   void (*print)(const char* text);
-  Now now;                      // counts instructions, or gives 0
+  Now now;  // counts instructions, or gives 0
   const char* name;
 };
 

@@ -34,8 +34,7 @@ constexpr double needle_m = 0.1;
 class Writer {
  public:
   template <class T>
-    requires(std::is_arithmetic_v<T> || std::is_enum_v<T>)
-  void operator()(const T& value) {
+  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) void operator()(const T& value) {
     if constexpr (std::is_floating_point_v<T>)
       put(static_cast<double>(value));
     else
@@ -72,7 +71,8 @@ std::uint64_t no_clock() { return 0; }
 
 // Asks all vectors, then appends the case to `out`; returns the answers.
 template <class Case>
-std::vector<Answer> add(Writer& out, const char* name, Kind kind, const model::Image& image, const Writer& beginning, const std::vector<Writer>& vectors) {
+std::vector<Answer> add(Writer& out, const char* name, Kind kind, const model::Image& image, const Writer& beginning,
+                        const std::vector<Writer>& vectors) {
   static Memory memory;
   const auto fresh = std::make_unique<Case>();
   Reader begins(beginning.bytes);
@@ -219,9 +219,10 @@ void add_haptic(Writer& out, const model::Image& image) {
   add(out, "tick, haptic", *loop, image);
 }
 
-// So deep in, aside and turning, and out again; from 2.1 mm before the tissue, so that no step ends on an edge of the mesh: a contact begins
-// there or a step later, as rounding wants.
-void add_insertion(Writer& out, const char* name, const model::Image& image, contact::Method method, model::Needle needle, double deepest_m) {
+// So deep in, aside and turning, and out again; from 2.1 mm before the tissue, so that no step ends on an edge of the mesh: a contact
+// begins there or a step later, as rounding wants.
+void add_insertion(Writer& out, const char* name, const model::Image& image, contact::Method method, model::Needle needle,
+                   double deepest_m) {
   Writer beginning;
   beginning(method);
   fields(beginning, needle);

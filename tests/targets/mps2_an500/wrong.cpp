@@ -1,7 +1,7 @@
 // An image that does what none may, for the test of the symbol table.
 #include <cstdlib>
 
-#include "board.hpp"
+#include "tests/targets/mps2_an500/board.hpp"
 
 extern "C" void* _sbrk(std::ptrdiff_t) { return nullptr; }  // without it, malloc does not link
 

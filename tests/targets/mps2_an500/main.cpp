@@ -1,17 +1,19 @@
 // The replay on the bare board: everything in one image, text and exit code through semihosting.
 #include <cstring>
 
-#include "board.hpp"
 #include "tests/targets/line.hpp"
+#include "tests/targets/mps2_an500/board.hpp"
 #include "tests/targets/replay.hpp"
 
 // The PC's vectors and image, as they are.
 asm(".section .payload, \"a\"\n"
     ".balign 64\n"
-    "golden_begin: .incbin \"" TROCAR_GOLDEN "\"\n"
+    "golden_begin: .incbin \"" TROCAR_GOLDEN
+    "\"\n"
     "golden_end:\n"
     ".balign 64\n"
-    "image_begin: .incbin \"" TROCAR_IMAGE "\"\n"
+    "image_begin: .incbin \"" TROCAR_IMAGE
+    "\"\n"
     "image_end:\n"
     ".previous");
 extern "C" const std::byte golden_begin[], golden_end[], image_begin[], image_end[];

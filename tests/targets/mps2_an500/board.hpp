@@ -22,12 +22,12 @@ void print(const char* text) noexcept;
 void spend(std::uint32_t n) noexcept;
 
 struct MemoryUse {
-  std::size_t code, constants;     // in ROM
-  std::size_t payload;             // in ROM, brought along by a test
-  std::size_t rom, rom_whole;      // all that is taken, all that there is
-  std::size_t initialised, zeroed; // static, in RAM
-  std::size_t stack, stack_whole;  // most that was ever used, reserved
-  std::size_t ram, ram_whole;      // static and the reserved stack; all that there is
+  std::size_t code, constants;      // in ROM
+  std::size_t payload;              // in ROM, brought along by a test
+  std::size_t rom, rom_whole;       // all that is taken, all that there is
+  std::size_t initialised, zeroed;  // static, in RAM
+  std::size_t stack, stack_whole;   // most that was ever used, reserved
+  std::size_t ram, ram_whole;       // static and the reserved stack; all that there is
 };
 [[nodiscard]] MemoryUse memory_use() noexcept;
 

@@ -1,4 +1,4 @@
-#include "board.hpp"
+#include "tests/targets/mps2_an500/board.hpp"
 
 #include <algorithm>
 #include <array>
