@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/core/precision.hpp"
+
 namespace trocar::contact {
 namespace {
 
@@ -36,7 +38,7 @@ bool solve_right(std::array<std::array<double, N>, N>& a, std::array<std::array<
     std::size_t best = k;
     for (std::size_t c = k + 1; c < n; ++c)
       if (std::abs(a[k][c]) > std::abs(a[k][best])) best = c;
-    if (!(std::abs(a[k][best]) > 1e-13)) return false;
+    if (!(std::abs(a[k][best]) > tolerance(1e-13, 1e-6))) return false;
     for (std::size_t r = 0; r < n; ++r) {
       std::swap(a[r][k], a[r][best]);
       std::swap(b[r][k], b[r][best]);
@@ -63,7 +65,7 @@ constexpr std::size_t transfer_index(std::size_t l, std::size_t k) noexcept { re
 template <std::size_t N>
 bool accurate(const std::array<std::array<double, N>, N>& a, const std::array<std::array<double, N>, N>& change,
               const std::array<std::array<double, N>, N>& m, std::size_t n) noexcept {
-  constexpr double largest_error = 1e-7;  // of the largest entry of A'
+  constexpr double largest_error = tolerance(1e-7, 1e-3);  // of the largest entry of A'
   using Matrix = std::array<std::array<double, N>, N>;
   const auto product = [n](const Matrix& x, const Matrix& y) {
     Matrix z{};

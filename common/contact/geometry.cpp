@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/core/precision.hpp"
+
 namespace trocar::contact {
 namespace {
 
@@ -35,7 +37,7 @@ Embedding single_node(std::uint32_t node) noexcept {
 void Geometry::open(const model::Tissue& tissue) noexcept {
   tissue_ = &tissue;
   // A point on an edge belongs to both cells although its coordinates are rounded.
-  tolerance_m_ = 1e-9 * tissue.edge_length_m;
+  tolerance_m_ = tolerance(1e-9, 1e-5) * tissue.edge_length_m;
   moved_count_ = 0;
 }
 

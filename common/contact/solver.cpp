@@ -7,18 +7,18 @@
 namespace trocar::contact {
 namespace {
 
-constexpr double inner_tolerance_n = 1e-11;  // aimed at, so that the promised one holds with room for rounding
+constexpr double inner_tolerance_n = tolerance(1e-11, 3e-6);  // aimed at, so that the promised one holds with room for rounding
 // Contacts that hardly differ carry huge opposite forces across the shaft; what rounding leaves of these is no violation. In units of the
 // largest force's last digit, and never near to the promised residual.
 constexpr double rounding_digits = 4.0 * std::numeric_limits<double>::epsilon();
 constexpr double largest_inner_tolerance_n = 0.3 * Solver::tolerance_n;
-constexpr double settled_n = 1e-13;           // at or below, the last forces are the solution of this tick too
-constexpr double largest_slip_start_n = 1e6;  // a contact that would begin by slipping under more begins stuck
+constexpr double settled_n = tolerance(1e-13, 1e-7);  // at or below, the last forces are the solution of this tick too
+constexpr double largest_slip_start_n = 1e6;          // a contact that would begin by slipping under more begins stuck
 constexpr int most_refinements = 3;
 constexpr int block_patience = 3;  // block exchanges without fewer violations
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Smallest pivot over the diagonal of M: below, the unknown is as good as dependent on those before it.
-constexpr double smallest_pivot = 1e-15;
+constexpr double smallest_pivot = tolerance(1e-15, 1e-6);
 
 double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
 Vector2 normal(const Vector2& tangent) noexcept { return {-tangent[1], tangent[0]}; }

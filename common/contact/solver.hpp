@@ -24,6 +24,7 @@
 #include <span>
 
 #include "common/core/capacities.hpp"
+#include "common/core/precision.hpp"
 
 namespace trocar::contact {
 
@@ -66,9 +67,9 @@ struct Solution {
 class Solver {
  public:
   static constexpr std::size_t capacity = capacity::contacts;
-  static constexpr double tolerance_n = 1e-9;  // of the residual
-  static constexpr int max_exchanges = 32;     // iterations of block pivoting
-  static constexpr int max_iterations = 256;   // altogether
+  static constexpr double tolerance_n = tolerance(1e-9, 1e-4);  // of the residual
+  static constexpr int max_exchanges = 32;                      // iterations of block pivoting
+  static constexpr int max_iterations = 256;                    // altogether
   static constexpr int max_pivots = max_exchanges * static_cast<int>(capacity) + max_iterations;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/precision.hpp"
+
 namespace trocar::contact {
 namespace {
 
@@ -331,7 +333,7 @@ void WorkingSet::push_node(const Vector2& crossing_m, const model::Cell& cell, s
     return;
   }
   if (law_->method == Method::Adapt && !geometry_.is_moved(node) &&
-      length(minus(crossing_m, geometry_.node_m(node))) > 1e-9 * tissue_->edge_length_m) {
+      length(minus(crossing_m, geometry_.node_m(node))) > tolerance(1e-9, 1e-5) * tissue_->edge_length_m) {
     if (compliance_.move(geometry_, node, crossing_m)) {
       forget_couplings(0);
       for (std::size_t i = 0; i < size(); ++i) {
@@ -429,7 +431,7 @@ WorkingSet::Trouble WorkingSet::enter(const Vector2& tip_m, const Vector2& direc
 // Newton on X + u(X) = tip from the last X, with the gradient of the cell in which X lies.
 void WorkingSet::find_tip(const Vector2& tip_m, Trouble& trouble) noexcept {
   constexpr int most_iterations = 30;
-  const double tolerance_m = 1e-9 * tissue_->edge_length_m;
+  const double tolerance_m = tolerance(1e-9, 3e-5) * tissue_->edge_length_m;
   std::array<Vector2, 4> nodes{};
   std::int32_t loaded = -1;
   for (int k = 0; k < most_iterations; ++k) {

@@ -6,10 +6,19 @@
 
 namespace trocar::capacity {
 
+// Samples between the tick and the bridge, 4 s at 1 kHz; nodes moved by mesh adaptation. TROCAR_SMALL_MEMORY, a microcontroller with some 4
+// MB, has fewer; of contacts as many as a PC, because they are part of a model image's format.
+#ifdef TROCAR_SMALL_MEMORY
+inline constexpr std::size_t sample_ring = 64;
+inline constexpr std::size_t adapted_nodes = 8;
+#else
+inline constexpr std::size_t sample_ring = 4096;
+inline constexpr std::size_t adapted_nodes = 40;
+#endif
+
 inline constexpr std::size_t drives = 4;                   // active joints of the twin; a single five-bar uses the first two
 inline constexpr std::size_t gain_sets = 4;                // named PID gain sets in one rig description
 inline constexpr std::size_t name = 32;                    // bytes of a name, terminator included
-inline constexpr std::size_t sample_ring = 4096;           // samples between the tick and the bridge: 4 s at 1 kHz
 inline constexpr std::size_t command_ring = 64;            // host commands waiting for a tick
 inline constexpr std::size_t stop_ring = 8;                // Stop commands waiting for a tick
 inline constexpr std::size_t event_ring = 256;             // events and replies waiting for the bridge
@@ -24,6 +33,5 @@ inline constexpr std::size_t velocity_law_rows = 16;       // points of a force 
 inline constexpr std::size_t cells_per_bucket = 64;        // candidate cells that one search looks at
 inline constexpr std::size_t ring_cells = 12;              // cells around a node that mesh adaptation may move
 inline constexpr std::size_t patch_nodes = 9;              // nodes of the cells around a node that mesh adaptation may move
-inline constexpr std::size_t adapted_nodes = 40;           // nodes moved by mesh adaptation
 
 }  // namespace trocar::capacity

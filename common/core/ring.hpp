@@ -36,12 +36,12 @@ class Ring {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_acquire); }
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::size_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
  private:
   alignas(64) std::atomic<std::size_t> head_{0};
   alignas(64) std::atomic<std::size_t> tail_{0};
-  std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<std::size_t> dropped_{0};  // of a word: on 32 bits 64 would take a lock
   alignas(64) std::array<T, Capacity> slots_{};
 };
 

@@ -30,7 +30,7 @@ double Flexible::arclength_m(const Vector2& x_m, double near_m) const noexcept {
     const needle::Station at = beam_.at(s);
     const double step = (at.tangent[0] * (x_m[0] - at.position_m[0]) + at.tangent[1] * (x_m[1] - at.position_m[1])) / at.stretch;
     s += step;
-    if (std::abs(step) < 1e-13) break;
+    if (std::abs(step) < tolerance(1e-13, 1e-8)) break;
   }
   return s;
 }

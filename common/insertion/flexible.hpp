@@ -22,6 +22,7 @@
 
 #include "common/contact/working_set.hpp"
 #include "common/core/capacities.hpp"
+#include "common/core/precision.hpp"
 #include "common/model/image.hpp"
 #include "common/needle/beam.hpp"
 
@@ -38,8 +39,9 @@ class Flexible {
   static constexpr int most_full_steps = 12;       // towards a pose: each costs (3 contacts)^3 / 3 operations
   static constexpr double least_nudge_rad = 1e-3;  // out of an unstable equilibrium
   static constexpr double part_way = 0.25;         // of the base's motion that is tried where the whole of it leads nowhere
-  static constexpr double tolerance_n = 1e-9;  // of the residual: what is left between tissue and shaft, over the contact's own compliance
-  static constexpr double beam_tolerance_nm = 1e-11;
+  // Of the residual: what is left between tissue and shaft, over the contact's own compliance.
+  static constexpr double tolerance_n = tolerance(1e-9, 1e-4);
+  static constexpr double beam_tolerance_nm = tolerance(1e-11, 1e-6);
 
   struct Outcome {
     bool converged{};  // otherwise bend and forces are those of the last converged tick, carried on rigidly

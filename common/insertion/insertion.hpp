@@ -18,6 +18,7 @@
 #include "common/contact/density.hpp"
 #include "common/contact/working_set.hpp"
 #include "common/core/capacities.hpp"
+#include "common/core/precision.hpp"
 #include "common/insertion/flexible.hpp"
 #include "common/model/image.hpp"
 
@@ -58,8 +59,8 @@ struct Result {
 
 class Insertion {
  public:
-  static constexpr double speed_filter_s = 0.020;             // low-pass of the speed along the shaft, for the velocity law
-  static constexpr double explicit_point_tolerance_m = 1e-9;  // across the shaft, at the first step
+  static constexpr double speed_filter_s = 0.020;  // low-pass of the speed along the shaft, for the velocity law
+  static constexpr double explicit_point_tolerance_m = tolerance(1e-9, 1e-6);  // across the shaft, at the first step
 
   // Starts afresh with this model, which must outlive its use here and come from model::open.
   void open(const model::Image& image) noexcept;

@@ -86,22 +86,24 @@ void write_law(const contact::Law& law, std::byte* out) noexcept {
 
 }  // namespace
 
-std::size_t image_size(const Image& image) noexcept { return header_of(blocks(image, {})).total_bytes; }
+std::size_t image_size(const Image& image) noexcept { return static_cast<std::size_t>(header_of(blocks(image, {})).total_bytes); }
 
 void write(const Image& image, std::span<std::byte> bytes) noexcept {
   const Parameters parameters = parameters_of(image);
   const auto block = blocks(image, parameters);
   Header header = header_of(block);
-  std::uint64_t end = sizeof(Header);
+  std::size_t end = sizeof(Header);
   for (std::size_t s = 0; s < sections; ++s) {
     const SectionEntry& entry = header.section[s];
-    std::memset(bytes.data() + end, 0, entry.offset - end);
-    end = entry.offset + entry.count * entry.element_bytes;
+    const auto offset = static_cast<std::size_t>(entry.offset);
+    const auto size = static_cast<std::size_t>(entry.count * entry.element_bytes);
+    std::memset(bytes.data() + end, 0, offset - end);
+    end = offset + size;
     if (s == static_cast<std::size_t>(Section::Law)) {
-      std::memset(bytes.data() + entry.offset, 0, sizeof(contact::Law));
-      write_law(*image.law, bytes.data() + entry.offset);
-    } else if (entry.count != 0) {
-      std::memcpy(bytes.data() + entry.offset, block[s].data, entry.count * entry.element_bytes);
+      std::memset(bytes.data() + offset, 0, sizeof(contact::Law));
+      write_law(*image.law, bytes.data() + offset);
+    } else if (size != 0) {
+      std::memcpy(bytes.data() + offset, block[s].data, size);
     }
   }
   std::memcpy(bytes.data(), &header, sizeof header);

@@ -88,7 +88,7 @@ bool edges_ok(const Tissue& t) noexcept {
         if (other != c && edge_of(t.cell[other], from, to) != t.cell[other].count) return false;
         if (edge_of(t.cell[other], to, from) != t.cell[other].count) across = other;
       }
-      if (across != std::max(cell.neighbour[k], -1)) return false;
+      if (across != std::max<std::int64_t>(cell.neighbour[k], -1)) return false;
     }
   }
   return true;
@@ -134,7 +134,7 @@ ImageStatus check_buckets(const Tissue& t, const Need& need) noexcept {
   if (!finite(b.origin_m) || !positive(b.size_m[0]) || !positive(b.size_m[1])) return ImageStatus::BadBuckets;
   if (b.count[0] == 0 || b.count[1] == 0) return ImageStatus::BadBuckets;
   const std::uint64_t count = static_cast<std::uint64_t>(b.count[0]) * b.count[1];
-  if (b.begin.size() - 1 != count || !begins_ok(b.begin, count, b.cell.size())) return ImageStatus::BadBuckets;
+  if (b.begin.size() != count + 1 || !begins_ok(b.begin, b.begin.size() - 1, b.cell.size())) return ImageStatus::BadBuckets;
   std::uint64_t expected = 0;
   for (const Cell& cell : t.cell) {
     const BucketRange r = buckets_of(t, cell);

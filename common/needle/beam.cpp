@@ -212,7 +212,7 @@ bool Beam::assemble() noexcept {
     scale_j += std::abs(turned_j) + (std::abs(f[0]) + std::abs(f[1])) * std::abs(ranked.load.arclength_m);
   }
   energy_j_ = bending_j - relaxed_j - work_j;
-  energy_noise_j_ = 1e-14 * scale_j;
+  energy_noise_j_ = tolerance(1e-14, 5e-6) * scale_j;
   residual_nm_ = 0.0;
   double sum = 0.0;  // NaN does not pass through max
   for (std::size_t k = 1; k < nodes_; ++k) {
@@ -289,8 +289,9 @@ Factor Beam::factorise(Tangent tangent) noexcept {
     const double l1 = i > 1 ? k1 / diagonal_[i - 1] : 0.0;
     const double whole = std::abs(diagonal_[i]) + bending;
     double pivot = diagonal_[i] - l1 * k1 - l2 * second_[i];
-    if (std::abs(pivot) < 1e-13 * whole) {
-      pivot = 1e-13 * whole;
+    const double least = tolerance(1e-13, 5e-5) * whole;
+    if (std::abs(pivot) < least) {
+      pivot = least;
       factor.singular = true;
     }
     if (pivot < 0.0) ++factor.negative_pivots;
@@ -365,7 +366,7 @@ Result Beam::solve(const Pose& base, std::span<const Load> loads) noexcept {
       double largest = 0.0;
       for (const double value : s) largest = std::max(largest, std::abs(value));
       // At a saddle exactly, nothing says to which side.
-      if (largest <= 1e-12) return end_with(Status::Unstable);
+      if (largest <= tolerance(1e-12, 1e-5)) return end_with(Status::Unstable);
       negative_curvature({down.data(), nodes_});
       escape = 0.5 * std::min(1.0, 1e3 * largest);
       factor = factorise(Tangent::Convex);

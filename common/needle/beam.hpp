@@ -25,6 +25,7 @@
 #include <span>
 
 #include "common/core/capacities.hpp"
+#include "common/core/precision.hpp"
 
 namespace trocar::needle {
 
@@ -105,8 +106,9 @@ struct Slide {
 class Beam {
  public:
   static constexpr std::size_t most_loads = capacity::needle_loads;
-  static constexpr int max_iterations = 100;       // of solve, every trial of a step counted
-  static constexpr double correction_rad = 1e-9;   // solve ends after a Newton step below this: the next would be about its square
+  static constexpr int max_iterations = 100;  // of solve, every trial of a step counted
+  static constexpr double correction_rad =
+      tolerance(1e-9, 1e-5);                       // solve ends after a Newton step below this: the next would be about its square
   static constexpr double longest_step_rad = 1.0;  // of any node in one Newton step
 
   // Starts at rest, theta' = kappa. NotOpen: length, EI and EA must be positive and finite, elements from 1 to capacity::needle_elements.

@@ -4,7 +4,12 @@ namespace trocar::virtual_needle {
 
 using mechanism::Vec3;
 
-VirtualNeedle::VirtualNeedle(const control::FadeConfig& fade) : model_(std::make_unique<insertion::Insertion>()), fade_config_(fade) {
+VirtualNeedle::VirtualNeedle(const control::FadeConfig& fade)
+    : own_model_(std::make_unique<insertion::Insertion>()), model_(own_model_.get()), fade_config_(fade) {
+  fade_.time_s = fade_config_.duration_s;
+}
+
+VirtualNeedle::VirtualNeedle(insertion::Insertion& model, const control::FadeConfig& fade) noexcept : model_(&model), fade_config_(fade) {
   fade_.time_s = fade_config_.duration_s;
 }
 

@@ -14,7 +14,9 @@ namespace trocar::virtual_needle {
 
 class VirtualNeedle {
  public:
-  explicit VirtualNeedle(const control::FadeConfig& fade = {});  // allocates; nothing else does
+  explicit VirtualNeedle(const control::FadeConfig& fade = {});  // allocates its model; nothing else does
+  // Where there is no allocator: in the caller's memory, which must outlive this.
+  explicit VirtualNeedle(insertion::Insertion& model, const control::FadeConfig& fade = {}) noexcept;
 
   // Any thread, one at a time. The image must outlive its use: until the next offer has been taken (`using_image`).
   void offer(const model::Image* image) noexcept { offered_.store(image, std::memory_order_release); }
@@ -36,7 +38,8 @@ class VirtualNeedle {
   void take() noexcept;
 
   std::atomic<const model::Image*> offered_{nullptr}, used_{nullptr};
-  std::unique_ptr<insertion::Insertion> model_;
+  std::unique_ptr<insertion::Insertion> own_model_{};
+  insertion::Insertion* model_;
   insertion::Result result_{};
   control::FadeConfig fade_config_{};
   control::FadeState fade_{};

@@ -11,9 +11,9 @@ CandumpLine candump_line(const CanFrame& frame, std::int64_t time_ns, const char
   CandumpLine line{};
   const std::uint32_t id = frame.error ? frame.id | error_flag : frame.id;
   const int digits = frame.extended || frame.error ? 8 : 3;
-  auto size = static_cast<std::size_t>(std::snprintf(line.data(), line.size(), "(%010lld.%06lld) %.15s %0*X#",
-                                                     static_cast<long long>(time_ns / 1'000'000'000),
-                                                     static_cast<long long>(time_ns / 1000 % 1'000'000), interface, digits, id));
+  auto size = static_cast<std::size_t>(
+      std::snprintf(line.data(), line.size(), "(%010lld.%06lld) %.15s %0*X#", static_cast<long long>(time_ns / 1'000'000'000),
+                    static_cast<long long>(time_ns / 1000 % 1'000'000), interface, digits, static_cast<unsigned>(id)));
   const auto put = [&](char c) {
     if (size + 2 < line.size()) line[size++] = c;
   };

@@ -1,5 +1,6 @@
 # What the real-time libraries call from outside of themselves, by the symbol tables of their archives: no allocator, no exception, no lock
 # and nothing that waits. Everything that is not arithmetic or a copy in memory has to be named below with its reason.
+# On Arm the compiler calls its runtime for 64-bit integers and their conversions, by names of the ABI; not for arithmetic in double.
 # Needs NM and ARCHIVES, LIBRARY=FILE separated by '|'. With EXPECT, an expression, they must be refused and the refusal must match it: that the
 # test can fail.
 cmake_minimum_required(VERSION 3.25)
@@ -7,6 +8,7 @@ cmake_minimum_required(VERSION 3.25)
 # The C library's arithmetic and memory; what the compiler calls by itself (the first line); Debian's libm under its finite names.
 set(plain
   "_GLOBAL_OFFSET_TABLE_|__stack_chk_fail|__assert_fail"
+  "__aeabi_(u?ldivmod|u?l2[df]|[df]2u?lz)"
   "mem(cpy|move|set|cmp)|strlen|bcmp"
   "(sin|cos|tan|sincos|asin|acos|atan|atan2|sinh|cosh|tanh|exp|exp2|expm1|log|log2|log10|log1p|pow|sqrt|cbrt|hypot|fmod|remainder|floor|ceil|round|lround|llround|rint|trunc|nearbyint|fma|ldexp|frexp|scalbn|copysign|nextafter)f?")
 list(JOIN plain "|" plain)
@@ -22,7 +24,8 @@ set(allowed
   "hal/udp_bus.cpp: recv|send: the tick's own traffic, on a socket that never waits"
   "hal/master.cpp: snprintf: a line for people, on request"
   "hal/candump.cpp: snprintf: a line of a log, on request"
-  "firmware_virtual_needle/virtual_needle.cpp: operator new\\(unsigned long, std::align_val_t\\)|operator delete\\(.*\\): in its constructor")
+  "firmware_virtual_needle/virtual_needle.cpp: operator new\\(unsigned (long|int), std::align_val_t\\)|operator delete\\(.*\\): in its constructor"
+  "float32/virtual_needle.cpp: operator new\\(unsigned (long|int), std::align_val_t\\)|operator delete\\(.*\\): in its constructor")
 
 set(problems "")
 set(symbols_seen 0)
@@ -41,7 +44,7 @@ foreach(pair IN LISTS archives)
   string(REPLACE "\n" ";" lines "${output}")
   set(object "")
   foreach(line IN LISTS lines)
-    if(line MATCHES "^([^ ].*)\\.o:$")
+    if(line MATCHES "^([^ ].*)\\.o(bj)?:$")
       set(object "${CMAKE_MATCH_1}")
       continue()
     endif()
