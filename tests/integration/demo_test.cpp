@@ -119,7 +119,7 @@ TEST(Demo, GoesBlindWhenItIsTold) {
 TEST(Demo, EndsCleanlyOnCtrlC) {
   const Scratch scratch;
   Program program(scratch, "trocar", demo(scratch));
-  ASSERT_TRUE(program.wait_for("insert", demo_s)) << program.errors();
+  ASSERT_TRUE(program.wait_for("insert", demo_s)) << program.errors() << recorded_faults(scratch / "run");
   program.signal(SIGINT);
   EXPECT_EQ(program.wait(end_s), 1) << program.errors();
   EXPECT_TRUE(processes_mentioning(scratch.folder().string()).empty());

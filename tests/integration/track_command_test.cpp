@@ -229,6 +229,33 @@ TEST_F(FakeCamera, IsListedAndItsFramesGrabbed) {
   EXPECT_EQ(rows, 20);
 }
 
+TEST_F(FakeCamera, BesideARigItsFramesHaveTheRigsTime) {
+  ASSERT_TRUE(ready) << camera.out();
+  const std::string rig_file = scratch.make_rig().string(), domain = std::to_string(own_domain());
+  Program plant(scratch, "trocar-plant", {"--rig", rig_file, "--no-tissue"});
+  ASSERT_TRUE(plant.wait_for("trocar-plant", answer_s)) << plant.errors();
+  const double before_s = steady_s();  // the controller's zero is later
+  Program rig(scratch, "trocar-rig", {"--rig", rig_file, "--domain", domain, "--best-effort"});
+  ASSERT_TRUE(rig.wait_for("DDS domain", answer_s)) << rig.errors();
+  Program grab(scratch, "trocar",
+               {"camera", "grab", "aravis:127.0.0.1", "--frames", "10", "--rate-hz", "20", "--domain", domain, "--out", path("grabbed")});
+  ASSERT_EQ(grab.wait(answer_s), 0) << grab.errors();
+  const double after_s = steady_s();
+  EXPECT_NE(grab.errors().find("times are the rig's from frame"), std::string::npos) << grab.errors();
+  EXPECT_NE(grab.errors().find("held to"), std::string::npos) << grab.errors();
+  std::istringstream table(read_text(scratch / "grabbed" / "frames.csv"));
+  std::string line;
+  std::getline(table, line);
+  double first_s = 0.0, last_s = 0.0;
+  while (std::getline(table, line)) {
+    last_s = std::stod(line.substr(line.find(',') + 1));
+    if (first_s == 0.0) first_s = last_s;
+  }
+  EXPECT_GT(first_s, 0.0);  // not from the camera's own zero, nor from its first frame
+  EXPECT_NEAR(last_s - first_s, 9.0 / 20.0, 0.3);
+  EXPECT_LT(last_s, after_s - before_s);
+}
+
 TEST_F(FakeCamera, UnpluggedInMidStreamIsSaidAndNothingBeforeIsLost) {
   ASSERT_TRUE(ready) << camera.out();
   Program grab(scratch, "trocar", {"camera", "grab", "aravis:127.0.0.1", "--rate-hz", "50", "--out", path("grabbed")});
