@@ -138,7 +138,7 @@ CellShape Geometry::shape(std::int32_t cell, const Vector2& x_m) const noexcept 
       j[3] += deta[k] * p[k][1];
     }
     const double determinant = j[0] * j[3] - j[1] * j[2];
-    if (std::abs(rest[0]) + std::abs(rest[1]) < 1e-4 * tolerance_m_ || step == most_steps || determinant == 0.0) break;
+    if (std::abs(rest[0]) + std::abs(rest[1]) < tolerance(1e-4, 1.0) * tolerance_m_ || step == most_steps || determinant == 0.0) break;
     // Far outside of the cell the map folds: stay near.
     xi = std::clamp(xi + (j[3] * rest[0] - j[1] * rest[1]) / determinant, -4.0, 4.0);
     eta = std::clamp(eta + (j[0] * rest[1] - j[2] * rest[0]) / determinant, -4.0, 4.0);
