@@ -89,7 +89,7 @@ std::vector<double> numbers_in(const toml::node& node) {
   if (const auto* array = node.as_array()) {
     for (const toml::node& element : *array) {
       if (!element.is_number()) return {};
-      values.push_back(*element.value<double>());
+      values.push_back(element.value<double>().value_or(0.0));
     }
   }
   return values;
@@ -154,7 +154,7 @@ struct Table::View {
   }
 
   [[nodiscard]] double finite_number(std::string_view key, const toml::node& node, Range range, std::string_view remedy) const {
-    const double value = *node.value<double>();
+    const double value = node.value<double>().value_or(std::nan(""));
     if (!std::isfinite(value)) fail(key, with_remedy("must be a finite number", remedy));
     if (value >= range.min && value <= range.max) return value;
     std::string problem = fmt::format("must be from {} to {}", range.min, range.max);

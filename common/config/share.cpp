@@ -30,7 +30,7 @@ std::filesystem::path share_folder() {
   std::error_code error;
   std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) {  // a bare root without /proc: the path that started this program, which the kernel leaves in its memory
-    const auto* started_as = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
+    const auto* started_as = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));  // NOLINT(performance-no-int-to-ptr): the kernel's way
     if (started_as != nullptr) program = std::filesystem::canonical(started_as, error);
   }
   if (program.empty()) throw UserError("cannot find the folder of the running program; give paths instead of names");

@@ -62,7 +62,7 @@ bool ready(int fd, short events, Timer::time_point end) {
 }
 
 bool connects(const sockaddr_un& address, int fd) {
-  return ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  return fd >= 0 && ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
 // As much as comes until then.
@@ -157,7 +157,7 @@ bool FrameServer::send(const Frame& frame, milliseconds timeout) {
   return false;
 }
 
-FrameClient::FrameClient(std::filesystem::path path, milliseconds timeout) {
+FrameClient::FrameClient(const std::filesystem::path& path, milliseconds timeout) {
   const sockaddr_un address = address_of(path);
   const auto end = Timer::now() + timeout;
   while (true) {

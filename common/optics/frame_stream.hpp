@@ -52,7 +52,7 @@ class FrameClient {
 
   // Connects, waiting for the server and its greeting for at most `timeout`. Throws config::UserError when there is none, or another
   // watcher.
-  FrameClient(std::filesystem::path path, std::chrono::milliseconds timeout);
+  FrameClient(const std::filesystem::path& path, std::chrono::milliseconds timeout);
   ~FrameClient();
   FrameClient(const FrameClient&) = delete;
   FrameClient& operator=(const FrameClient&) = delete;

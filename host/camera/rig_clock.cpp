@@ -99,11 +99,11 @@ Source::Status RigTimedSource::next(optics::Frame& frame, std::chrono::milliseco
       frame.time_ns = time->time_ns;
       frame.time_uncertainty_ns = time->uncertainty_ns;
       if (frames_++ == 0) {
-        const auto rig = rig_->estimate();
+        const auto rig = rig_->estimate().value_or(ClockOffset::Estimate{});  // begun anew this moment: the next lines say so
         notices_.push_back(fmt::format(
             "times are the rig's from frame {} on: it began {:.6f} s after this machine's clock, which gains {:.1f} us a second; "
             "held to {:.1f} us",
-            frame.number, 1e-9 * static_cast<double>(rig->offset_ns), 1e6 * rig->drift, 1e-3 * static_cast<double>(time->uncertainty_ns)));
+            frame.number, 1e-9 * static_cast<double>(rig.offset_ns), 1e6 * rig.drift, 1e-3 * static_cast<double>(time->uncertainty_ns)));
         restarts_ = rig_->restarts();
       }
       if (const std::uint64_t restarts = rig_->restarts(); restarts != restarts_) {

@@ -84,16 +84,22 @@ void Surface::take(const Phantom& phantom, std::int64_t time_ns, const std::arra
   }
 }
 
-Camera::Camera(const optics::SimulatedCamera& config, const std::array<double, 2>& origin_m, double needle_length_m, std::uint64_t seed)
-    : grid_(config.grid), origin_(origin_m), length_m_(needle_length_m) {
+namespace {
+
+optics::Renderer make_renderer(const optics::SimulatedCamera& config, std::uint64_t seed) {
   const auto file = config::find_share("cameras", config.name);
   const optics::Camera camera = optics::read_camera(file);
   try {
-    renderer_.emplace(camera, optics::looking_down(camera, config.grid, config.m_per_px), config.grid, config.appearance, seed);
+    return {camera, optics::looking_down(camera, config.grid, config.m_per_px), config.grid, config.appearance, seed};
   } catch (const std::invalid_argument& e) {
     throw config::UserError(fmt::format("{}: {}; take another camera, or another m_per_px", file.string(), e.what()));
   }
 }
+
+}  // namespace
+
+Camera::Camera(const optics::SimulatedCamera& config, const std::array<double, 2>& origin_m, double needle_length_m, std::uint64_t seed)
+    : grid_(config.grid), origin_(origin_m), length_m_(needle_length_m), renderer_(make_renderer(config, seed)) {}
 
 void Camera::render(const SurfaceState& state, std::uint64_t number, optics::Frame& frame) {
   const double dt_s = before_.empty() ? 0.0 : 1e-9 * static_cast<double>(state.time_ns - before_ns_);
@@ -110,8 +116,8 @@ void Camera::render(const SurfaceState& state, std::uint64_t number, optics::Fra
   const optics::PlanePoint base{state.base_pose[0] - origin_[0], state.base_pose[1] - origin_[1]};
   const std::array<optics::PlanePoint, 2> needle{base, {base.x_m + length_m_ * std::cos(theta), base.y_m + length_m_ * std::sin(theta)}};
   const bool known = std::isfinite(base.x_m) && std::isfinite(base.y_m) && std::isfinite(theta);
-  renderer_->render(states_, known ? std::span<const optics::PlanePoint>(needle) : std::span<const optics::PlanePoint>(), number,
-                    state.time_ns, frame);
+  renderer_.render(states_, known ? std::span<const optics::PlanePoint>(needle) : std::span<const optics::PlanePoint>(), number,
+                   state.time_ns, frame);
 }
 
 }  // namespace trocar::sim_plant

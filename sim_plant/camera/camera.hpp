@@ -50,14 +50,14 @@ class Camera {
   Camera(const optics::SimulatedCamera& config, const std::array<double, 2>& origin_m, double needle_length_m, std::uint64_t seed);
   // Velocities, for blur and rolling shutter, are those since the last frame.
   void render(const SurfaceState& state, std::uint64_t number, optics::Frame& frame);
-  [[nodiscard]] std::span<const optics::MarkerTruth> truth() const noexcept { return renderer_->truth(); }
-  [[nodiscard]] const optics::Pose& pose() const noexcept { return renderer_->view().pose(); }
+  [[nodiscard]] std::span<const optics::MarkerTruth> truth() const noexcept { return renderer_.truth(); }
+  [[nodiscard]] const optics::Pose& pose() const noexcept { return renderer_.view().pose(); }
 
  private:
   optics::MarkerGrid grid_;
   std::array<double, 2> origin_{};
   double length_m_{};
-  std::optional<optics::Renderer> renderer_{};
+  optics::Renderer renderer_;
   std::vector<optics::MarkerState> states_{};
   std::vector<optics::PlanePoint> before_{};
   std::int64_t before_ns_{};

@@ -11,7 +11,7 @@ namespace trocar::sim_plant {
 Eye::Eye(const EyeOptions& options, const scene::Scene& scene, const Phantom& phantom, optics::Clock clock)
     : grid_(options.camera.grid),
       surface_(phantom, scene, grid_),
-      camera_(options.camera, surface_.origin_m(), scene.needle->length_m, options.seed),
+      camera_(options.camera, surface_.origin_m(), scene.needle.value().length_m, options.seed),
       server_(options.socket, clock) {
   if (options.truth.empty()) return;
   truth_.emplace(options.truth);
