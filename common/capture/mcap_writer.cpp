@@ -75,7 +75,7 @@ McapWriter::McapWriter(std::filesystem::path path, McapOptions options) : path_(
 McapWriter::~McapWriter() {
   try {
     close();
-  } catch (const CaptureError&) {  // whoever wanted to know called close()
+  } catch (const CaptureError&) {  // NOLINT(bugprone-empty-catch): whoever wanted to know called close()
   }
 }
 

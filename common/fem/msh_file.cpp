@@ -127,7 +127,8 @@ bool read_format(Reader& in) {
   double number = 0.0;
   int kind = -1;
   int size = 0;
-  if (std::sscanf(version.c_str(), "%lf %d %d", &number, &kind, &size) != 3 || (kind != 0 && kind != 1))
+  // A number too large for its type is none of those asked for below.
+  if (std::sscanf(version.c_str(), "%lf %d %d", &number, &kind, &size) != 3 || (kind != 0 && kind != 1))  // NOLINT(cert-err34-c)
     in.fail("expected version, file type and data size after $MeshFormat");
   if (number != 2.2 && number != 4.1)
     in.fail("format " + version.substr(0, version.find(' ')) + " is not read; save the mesh as version 4.1 or 2.2");
