@@ -32,6 +32,7 @@ void on_signal(int) { stop_asked.store(true); }
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): what adds options throws when they contradict each other, in any call
 int main(int argc, char** argv) {
   CLI::App app{"trocar: runs a needle-insertion rig, or a simulated one.\nExample: trocar demo"};
   app.require_subcommand(1);

@@ -185,6 +185,7 @@ int run(const Options& options) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): what adds options throws when they contradict each other, in any call
 int main(int argc, char** argv) {
   Options options;
   bool die_with_parent = false;

@@ -182,6 +182,7 @@ int run(const Options& options) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): what adds options throws when they contradict each other, in any call
 int main(int argc, char** argv) {
   Options options;
   bool die_with_parent = false;

@@ -15,6 +15,7 @@ void on_signal(int) { stop_asked.store(true); }
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): what adds options throws when they contradict each other, in any call
 int main(int argc, char** argv) {
   // What OpenCV has to say comes as an exception, or as a status; its own lines would break ours.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
