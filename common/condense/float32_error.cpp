@@ -41,8 +41,7 @@ Eigen::SparseMatrix<double> reference_line(const Candidates& c, const scene::Sce
   const double step = std::max({spacing_m, c.edge_length_m, length / static_cast<double>(capacity::contacts)});
   std::vector<Eigen::Triplet<double>> entries;
   int contacts = 0;
-  // A point more or less, by rounding, is none of a reference's.
-  for (double s = 0.5 * step; s < length; s += step) {  // NOLINT(cert-flp30-c,clang-analyzer-security.FloatLoopCounter)
+  for (double s = 0.5 * step; s < length; s += step) {
     const Vector2 x{line.from_m[0] + s / length * (line.to_m[0] - line.from_m[0]),
                     line.from_m[1] + s / length * (line.to_m[1] - line.from_m[1])};
     const std::int32_t at = cell_at(c.node_m, c.cell, c.buckets, x);

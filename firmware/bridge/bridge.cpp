@@ -4,7 +4,6 @@
 
 #include <array>
 #include <chrono>
-#include <cstring>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -218,7 +217,7 @@ void Bridge::publish_rest() {
   } else if (s.mode == Mode::Off) {
     std::array<char, 384> line{};
     if (snapshot_.operational) {
-      std::strcpy(line.data(), "drives operational, waiting for their first values");
+      wire::copy_text(line, "drives operational, waiting for their first values");
     } else {
       hal::canopen::describe(snapshot_.drives, line);
     }

@@ -81,7 +81,7 @@ struct Cut {
 // A compiled scene and a needle in it. The large objects live on the heap.
 class Run {
  public:
-  Run(const scene::Scene& scene, condense::Plan plan, std::vector<Cut> cuts = {}) : cuts_(std::move(cuts)) {
+  Run(const scene::Scene& scene, const condense::Plan& plan, std::vector<Cut> cuts = {}) : cuts_(std::move(cuts)) {
     condense::Options options;
     options.visible = condense::WithVisible::No;
     const bool show = isatty(STDERR_FILENO) == 1;

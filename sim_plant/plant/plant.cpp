@@ -13,6 +13,8 @@ void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument(message);
 }
 
+// In initialisers: what is handed on outlives the call.
+// NOLINTBEGIN(bugprone-return-const-ref-from-parameter)
 const rig::Rig& checked(const rig::Rig& rig) {
   require(rig.kind == rig::Kind::Twin,
           "rig " + std::string(rig.name.data()) +
@@ -36,6 +38,7 @@ const PlantConfig& checked(const PlantConfig& c) {
             "plant: friction must not be negative, and Coulomb friction needs a bristle stiffness");
   return c;
 }
+// NOLINTEND(bugprone-return-const-ref-from-parameter)
 
 TwinBodyConfig body_of(const rig::Rig& rig, const PlantConfig& plant) {
   TwinBodyConfig body;
