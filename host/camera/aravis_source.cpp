@@ -89,8 +89,8 @@ class AravisSource : public Source {
   ~AravisSource() override {
     if (camera_ == nullptr) return;
     if (gone_) {  // to say goodbye to it takes Aravis a dozen seconds of waiting for answers; what it holds ends with the program
-      (void)stream_.release();
-      (void)camera_.release();
+      (void)stream_.release();  // NOLINT(bugprone-unused-return-value): on purpose
+      (void)camera_.release();  // NOLINT(bugprone-unused-return-value)
       return;
     }
     g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);

@@ -1,5 +1,6 @@
 #include "host/camera/calibrate.hpp"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,6 +26,12 @@ constexpr std::array<Turn, 3> turns{
 // How much the squared residuals over their variance must fall when a view is turned back: it is then e^10 times likelier. On the
 // photographs of the tests a good view rises, by 1 to 200; a turned one falls by 20 to 1200.
 constexpr double turned_evidence = 20.0;
+
+// OpenCV solves its small systems with whatever LAPACK is installed. OpenBLAS's threads wait for each other longer than such a system
+// takes: on a busy machine 35 s instead of 1.4.
+void keep_openblas_to_one_thread() {
+  if (void* const found = ::dlsym(RTLD_DEFAULT, "openblas_set_num_threads"); found != nullptr) reinterpret_cast<void (*)(int)>(found)(1);
+}
 
 struct Solution {
   double rms_px{};
@@ -89,6 +96,7 @@ Solution solve(const std::vector<View>& views, const std::vector<std::size_t>& u
   s.matrix = cv::Mat::eye(3, 3, CV_64F);
   s.distortion = cv::Mat::zeros(1, 5, CV_64F);
   cv::Mat deviation, pose_deviation, view_rms;
+  keep_openblas_to_one_thread();
   s.rms_px = cv::calibrateCamera(objects, images, size, s.matrix, s.distortion, s.rotation, s.translation, deviation, pose_deviation,
                                  view_rms, flags_of(options), {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 1e-12});
   // OpenCV takes the noise as squared residuals over (corners - parameters); two numbers come from each corner.

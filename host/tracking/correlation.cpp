@@ -103,7 +103,8 @@ Located locate_by_correlation(const optics::Frame& frame, const Gains& gains, co
     take_window(frame, Grey::Least, gains, u - whole / 2, v - whole / 2, whole, whole, window);
     scratch.bytes.resize(window.level.size());
     scratch.opened.resize(window.level.size());
-    for (std::size_t i = 0; i < window.level.size(); ++i) scratch.bytes[i] = static_cast<unsigned char>(window.level[i] + 0.5F);
+    for (std::size_t i = 0; i < window.level.size(); ++i)
+      scratch.bytes[i] = static_cast<unsigned char>(window.level[i] + 0.5F);  // NOLINT(bugprone-incorrect-roundings): none is negative
     const cv::Mat levels(whole, whole, CV_8U, scratch.bytes.data());
     cv::Mat opened(whole, whole, CV_8U, scratch.opened.data());
     cv::morphologyEx(levels, opened, cv::MORPH_OPEN, element);
