@@ -74,6 +74,8 @@ class RunningRig : public ::testing::Test {
 
   // The recorder's file after an orderly end of the recorder.
   capture::RigLog finish_recording() {
+    // What the client has heard may still be on its way to the recorder.
+    (void)until(0.3, [] { return false; });
     recorder->signal(SIGINT);
     EXPECT_EQ(recorder->wait(react_s), 0) << recorder->errors();
     auto log = capture::read_capture(capture_file);
