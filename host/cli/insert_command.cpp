@@ -223,7 +223,7 @@ Run subdivided(scene::Scene scene, const std::filesystem::path& path_file, const
                       "coarser mesh, a shorter path or the method \"embedded\"",
                       scene.file.string(), cuts[k].candidate.size(), capacity::contacts));
   }
-  return {scene, std::move(plan), std::move(cuts)};
+  return {scene, plan, std::move(cuts)};
 }
 
 std::string off_shaft(const scene::Scene& scene, const Pose& base) {
