@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/config/user_error.hpp"
-#include "common/core/contracts.hpp"
+#include "common/wire/convert.hpp"
 #include "common/wire/dds.hpp"
 
 namespace trocar::camera {
@@ -42,7 +42,12 @@ void RigClock::listen() {
     std::int64_t newest_ns = 0;
     bool any = false;
     entities_->samples.take([&](const wire::SampleBatch& batch) {
-      if (batch.protocol != protocol_version || batch.samples._length == 0) return;
+      if (std::string problem = wire::version_problem("the rig", batch.protocol); !problem.empty()) {
+        const std::lock_guard lock(mutex_);
+        foreign_ = std::move(problem);
+        return;
+      }
+      if (batch.samples._length == 0) return;
       newest_ns = batch.samples._buffer[batch.samples._length - 1].time_ns;
       any = true;
     });
@@ -74,6 +79,11 @@ std::uint64_t RigClock::restarts() const {
 bool RigClock::silent() const {
   const std::lock_guard lock(mutex_);
   return heard_ns_ != 0 && now_ns() - heard_ns_ > silence_ns;
+}
+
+std::string RigClock::foreign() const {
+  const std::lock_guard lock(mutex_);
+  return foreign_;
 }
 
 RigTimedSource::RigTimedSource(std::unique_ptr<Source> source, std::unique_ptr<RigClock> rig)
@@ -120,6 +130,9 @@ Source::Status RigTimedSource::next(optics::Frame& frame, std::chrono::milliseco
     ++(frames_ == 0 ? passed_ : dropped_);
   }
   if (status != Status::Frame && status != Status::Timeout) return status;
+  // Another rig may speak there too: only when none of ours came.
+  if (const std::string foreign = rig_->foreign(); frames_ == 0 && now_ns() - begun_ns_ > patience_ns && !foreign.empty())
+    throw config::UserError(fmt::format("DDS domain {}: {}", rig_->domain(), foreign));
   if (frames_ == 0 && now_ns() - begun_ns_ > patience_ns)
     throw config::UserError(
         fmt::format("no rig is heard on DDS domain {} for {} s, so that frames have no time of it; start it, name its "

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "host/camera/clock_offset.hpp"
@@ -34,6 +35,7 @@ class RigClock {
   [[nodiscard]] std::optional<ClockOffset::Estimate> estimate() const;
   [[nodiscard]] std::uint64_t restarts() const;  // of the controller
   [[nodiscard]] bool silent() const;             // heard once, and not for two seconds
+  [[nodiscard]] std::string foreign() const;     // a rig of another protocol speaks: which; else empty
   [[nodiscard]] std::uint32_t domain() const noexcept { return domain_; }
 
  private:
@@ -46,6 +48,7 @@ class RigClock {
   ClockOffset offset_{};
   std::uint64_t batches_{};  // since the clock last stepped
   std::int64_t heard_ns_{};
+  std::string foreign_{};
   std::atomic<bool> stop_{false};
   std::thread thread_{};
 };
@@ -56,7 +59,7 @@ class RigTimedSource : public Source {
  public:
   RigTimedSource(std::unique_ptr<Source> source, std::unique_ptr<RigClock> rig);
 
-  // Throws config::UserError when no rig is heard for 30 s from the first call.
+  // Throws config::UserError when no rig of this protocol is heard for 30 s from the first call.
   [[nodiscard]] Status next(optics::Frame& frame, std::chrono::milliseconds timeout) override;
   [[nodiscard]] SourceCounters counters() const override;  // frames: those handed out here
   [[nodiscard]] Clock clock() const override { return Clock::Rig; }

@@ -21,7 +21,12 @@ constexpr double end_s = 20.0;  // the picture, and what is still in the queue
 
 DemoCamera::DemoCamera(const optics::SimulatedCamera& camera, std::filesystem::path out) : camera_(camera), out_(std::move(out)) {
   // A socket's name is short; the run's folder may lie deep.
-  std::string name = (std::filesystem::temp_directory_path() / "trocar-XXXXXX").string();
+  std::error_code error;
+  const auto temporary = std::filesystem::temp_directory_path(error);
+  if (error)
+    throw config::UserError(fmt::format(
+        "the folder for temporary files (TMPDIR) is none ({}): set it to one that is yours, or add --no-camera", error.message()));
+  std::string name = (temporary / "trocar-XXXXXX").string();  // mkdtemp fills in the Xs
   if (::mkdtemp(name.data()) == nullptr)
     throw config::UserError(
         fmt::format("{}: cannot be made ({}): set TMPDIR to a folder that is yours, or add --no-camera", name, std::strerror(errno)));
