@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/core/precision.hpp"
 
@@ -16,6 +17,17 @@ constexpr double softness_of_short = 0.1;    // of its own compliance: about wha
 // Of the jumps. Between 0.1 and 0.15 hardly any error that accuracy_benchmark measures changes by a third, but without them forces along
 // grid lines alternate.
 constexpr double jump_stabilisation = 0.15;
+// What planar elements miss of the ridge along a line that crosses them is, over what their interpolation would miss, 1 + along sin^2 of
+// twice the angle to their edges for an axial load, 1 + across sin^2 for a lateral one. And what the last segment, at the end of the line,
+// misses more than that, laterally, in 1 / (mu t). By tests/benchmarks/accuracy/unresolved.py.
+struct Unresolved {
+  double along, across, end_across;
+};
+constexpr Unresolved of_triangles{0.4, -0.1, 0.017}, of_quadrilaterals{0.03, -0.4, 0.011};
+// A stuck line bears on its end like 1 / sqrt(distance), which a density that is constant over a segment cannot follow, and whose jump is
+// not to count. Without it the line seems shorter by up to a fifth of a segment. Shares of the line's own compliance A and of the jump's,
+// and for the last but one while the last is half grown and soft; by the same program's plane without elements.
+constexpr double end_share_of_line = 1.0 / 6.0, end_share_of_jump = 1.0 / 3.0, end_share_half_grown = 0.5;
 // Of what the tissue's own compliance would give for the lateral force that is missing: a tip that a bevel carries aside approaches that
 // force, and a long step does not carry it beyond.
 constexpr double largest_aside = 0.2;
@@ -130,12 +142,30 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexce
   return before + 1;
 }
 
+// The square of the sine of twice the angle between a direction and a cell's edges; of a triangle's, those that meet most squarely.
+double WorkingSet::askew_to(const model::Cell& cell, const Vector2& direction) const noexcept {
+  double least = 2.0, askew = 0.0;
+  for (std::size_t k = 0; k < cell.count; ++k) {
+    const Vector2 at = geometry_.node_m(cell.node[k]);
+    const Vector2 a = minus(geometry_.node_m(cell.node[(k + 1) % cell.count]), at);
+    const Vector2 b = minus(geometry_.node_m(cell.node[(k + cell.count - 1) % cell.count]), at);
+    const double off_square = std::abs(dot(a, b)) / (length(a) * length(b));
+    if (off_square >= least) continue;
+    least = off_square;
+    const double cosine = dot(a, direction) / length(a);
+    askew = 4.0 * cosine * cosine * (1.0 - cosine * cosine);
+  }
+  return askew;
+}
+
 // A line load q bends the displacement sharply, by -q |d| / (2 C t) at the distance d, and elements that the line crosses cannot: on the
-// line they miss q / (2 C t) sum w_k |d_k|, nothing where the line runs along edges. C is the shear modulus along the line, that of
+// line they miss about q / (2 C t) sum w_k |d_k|, nothing where the line runs along edges. C is the shear modulus along the line, that of
 // uniaxial strain across it. And a density that alternates from segment to segment hardly moves elements of their size, though it moves
-// tissue: the jump of density to the predecessor counts. In a solid the force is spread over the needle's cross-section, which the mesh
-// may resolve.
+// tissue: the jump of density to the predecessor counts. The end of the line is stiffer than its segments (end_). A last segment shorter
+// than the elements moves them as one of their size would: it misses A ln(size / length), A = (1 / mu + 1 / C) / (4 pi t) the logarithm's
+// factor in the plane's point load (Kelvin). In a solid the force is spread over the needle's cross-section, which the mesh may resolve.
 void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept {
+  end_[i] = half_end_[i] = {};
   if (tissue_->model == element::Model::Solid) return;
   const Vector2 chord = minus(to_m, from_m);
   const double length_m = length(chord);
@@ -143,10 +173,10 @@ void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, cons
   const std::int32_t middle = geometry_.locate(plus(from_m, scaled(chord, 0.5)), tip_cell_);
   const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(middle < 0 ? tip_cell_ : middle)];
   const element::Elasticity c = element::elasticity(tissue_->model, tissue_->material[cell.material]);
-  // `scale` over C t, in the axes of the mesh.
-  const auto compliance = [&](double scale) {
-    const double along = scale / (c(2, 2) * tissue_->thickness_m);
-    const double across = scale / (c(0, 0) * tissue_->thickness_m);
+  const double compliance_along = 1.0 / (c(2, 2) * tissue_->thickness_m), compliance_across = 1.0 / (c(0, 0) * tissue_->thickness_m);
+  // In the axes of the mesh.
+  const auto compliance = [&](double share_along, double share_across) {
+    const double along = share_along * compliance_along, across = share_across * compliance_across;
     const double shear = (along - across) * t[0] * t[1];
     return Block{along * t[0] * t[0] + across * t[1] * t[1], shear, shear, along * t[1] * t[1] + across * t[0] * t[0]};
   };
@@ -155,21 +185,49 @@ void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, cons
     const Vector2 x = minus(geometry_.node_m(at.node[k]), from_m);
     distance_m += at.weight[k] * std::abs(t[0] * x[1] - t[1] * x[0]);
   }
+  const double mixed = 2.0 * row_[i][1] * t[0] * t[1];
+  const double own_along = row_[i][0] * t[0] * t[0] + row_[i][3] * t[1] * t[1] + mixed;
+  const double own_across = row_[i][0] + row_[i][3] - own_along;
   // The load's length is a whole segment's from the start: a shorter one is no line on the scale of the elements.
   const double spacing = law_->spacing_m;
-  add(row_[i], compliance(std::max(0.0, distance_m) / (2.0 * spacing)));
+  const Unresolved& unresolved = cell.count == 3 ? of_triangles : of_quadrilaterals;
+  const double ridge = std::max(0.0, distance_m) / (2.0 * spacing);
+  const double askew = askew_to(cell, t);
+  add(row_[i], compliance((1.0 + askew * unresolved.along) * ridge, (1.0 + askew * unresolved.across) * ridge));
+  const double line = (compliance_along + compliance_across) / (4.0 * std::numbers::pi);
+  const double resolved_m = std::min(spacing, tissue_->edge_length_m);
+  if (length_m < resolved_m) add(row_[i], {line, 0.0, 0.0, line}, std::log(resolved_m / length_m));
+  const double per_edge = tissue_->edge_length_m / spacing;
+  const double jump_share = jump_stabilisation * per_edge * per_edge;
+  // A line that leaves the tissue does not end. On segments shorter than the elements the ends are the elements'. Where these hardly
+  // yield, at a support or because they are all but incompressible (plane stress never is), the end is not to take what there is.
+  ends_inside_ = tip_inside_;
+  const double whole = tip_inside_ ? std::min(1.0, 1.0 / (per_edge * per_edge)) : 0.0;
+  const double yields_along = whole * std::clamp(own_along / line - 1.5, 0.0, 1.0);
+  const double yields_across =
+      whole * std::clamp(own_across / line - 1.5, 0.0, 1.0) * std::min(1.0, 4.0 * compliance_across / compliance_along);
+  const double line_along = line / compliance_along, line_across = line / compliance_across;
+  const double at_end = end_share_of_jump * jump_share;
+  end_[i] = compliance(
+      -yields_along * (end_share_of_line * line_along + at_end),
+      -yields_across * (end_share_of_line * line_across + at_end - unresolved.end_across * compliance_along / compliance_across));
+  half_end_[i] = compliance(0.0, -yields_across * end_share_half_grown * line_across);
   if (i > 0) {
-    // f_i - (l_i / l_(i-1)) f_(i-1): a segment that is still short neither holds its predecessor nor is held by it.
-    const double per_edge = tissue_->edge_length_m / spacing;
-    const Block jump = compliance(jump_stabilisation * per_edge * per_edge);
+    // f_i - (l_i / l_(i-1)) f_(i-1): a segment that is still short neither holds its predecessor nor is held by it, which ends the line
+    // as far as the short one does not yet.
+    const Block jump = compliance(jump_share, jump_share);
     const double share = length_m / (spacing * length(point_[i - 1].heading));
     add(row_[i], jump);
     add(row_[i - 1], jump, -share);
     Block before = own_[i - 1];
     add(before, jump, share * share);
+    const double grown = std::min(1.0, length_m / spacing);
+    add(before, end_[i - 1], 1.0 - grown);
+    add(before, half_end_[i - 1], 4.0 * grown * (1.0 - grown));
     solver_.replace_own(i - 1, before);
   }
   own_[i] = row_[i];
+  add(row_[i], end_[i]);
 }
 
 void WorkingSet::push(const Point& point) noexcept {
@@ -185,7 +243,16 @@ void WorkingSet::pop() noexcept {
   solver_.pop();
   forget_couplings(size());
   // What is the last one now was a whole segment: its tie is not softened.
-  if (size() > 0 && segments()) solver_.replace_own(size() - 1, own_[size() - 1]);
+  if (size() > 0 && segments()) solver_.replace_own(size() - 1, own_at_end(0.0, {1.0, 0.0}));
+}
+
+// Of the last segment, as the end of the line.
+Block WorkingSet::own_at_end(double softness, const Vector2& tangent) const noexcept {
+  const Vector2 n{-tangent[1], tangent[0]};
+  Block own = own_[size() - 1];
+  add(own, end_[size() - 1]);
+  add(own, {n[0] * n[0], n[0] * n[1], n[0] * n[1], n[1] * n[1]}, softness);
+  return own;
 }
 
 void WorkingSet::soften_last(const Vector2& tangent) noexcept {
@@ -196,11 +263,7 @@ void WorkingSet::soften_last(const Vector2& tangent) noexcept {
   if (softened_ != i || std::abs(covered - softened_length_m_) >= soften_step * spacing || covered >= spacing)
     softened_length_m_ = std::clamp(covered, soften_step * spacing, spacing);
   softened_ = i;
-  const double softness = softness_of_short * 0.5 * (own_[i][0] + own_[i][3]) * (spacing / softened_length_m_ - 1.0);
-  const Vector2 n{-tangent[1], tangent[0]};
-  const Block own{own_[i][0] + softness * n[0] * n[0], own_[i][1] + softness * n[0] * n[1], own_[i][2] + softness * n[0] * n[1],
-                  own_[i][3] + softness * n[1] * n[1]};
-  solver_.replace_own(i, own);
+  solver_.replace_own(i, own_at_end(softness_of_short * 0.5 * (own_[i][0] + own_[i][3]) * (spacing / softened_length_m_ - 1.0), tangent));
 }
 
 bool WorkingSet::place(const Vector2& x_m) noexcept {
@@ -296,7 +359,7 @@ void WorkingSet::resize_last(double length_m, const Vector2& direction) noexcept
   }
   const double now = std::clamp(length_m, resize_step * spacing / 2, spacing);
   const bool grown_up = now == spacing && last.length_m != spacing;
-  if (std::abs(now - last.length_m) < resize_step * spacing && !grown_up) return;
+  if (std::abs(now - last.length_m) < resize_step * spacing && !grown_up && ends_inside_ == tip_inside_) return;
   const Vector2 end = plus(last.begin_m, scaled(last.heading, now));
   last.at = geometry_.segment(last.begin_m, end, tip_cell_);
   last.material_m = geometry_.mean_m(last.at);

@@ -6,9 +6,11 @@
 //     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of 1/128 of
 //     the spacing. While it is short its tie across the shaft is softened by a tenth of its own compliance times (spacing / length - 1),
 //     in steps of 1/512 of the spacing, so that beginning or leaving it does not kick. A segment keeps the course that was cut: coming
-//     back follows it. In planar tissue two things are added that elements cannot follow (tests/benchmarks/accuracy_benchmark.cpp):
-//     ridge  that a line load makes of the displacement, sum w_k |d_k| / (2 C t) per density, d_k the nodes' distances from the line.
-//            Without it an oblique needle is some 3 % too stiff on 80 x 80 elements.
+//     back follows it. In planar tissue three things are added that elements and segments cannot follow
+//     (tests/benchmarks/accuracy_benchmark.cpp):
+//     ridge  that a line load makes of the displacement, about sum w_k |d_k| / (2 C t) per density, d_k the nodes' distances from the
+//            line. Without it an oblique needle is some 3 % too stiff on 80 x 80 elements.
+//     end    of the line, at the tip, on which it bears most: without it stiffness wavers by some per cent as segments come and go.
 //     jump   of the density between neighbours, g h^2 / (C t) (q_i - q_(i-1)), g = 0.15, h the mesh's edge (Burman and Hansbo 2010,
 //            doi.org/10.1016/j.cma.2010.05.011): a sum of squares, so G stays positive; nothing for a constant density. Without it one
 //            force per edge is not inf-sup stable and alternates.
@@ -122,7 +124,9 @@ class WorkingSet {
   void forget_couplings(std::size_t from_contact) noexcept;
   [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
   std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
+  [[nodiscard]] double askew_to(const model::Cell& cell, const Vector2& direction) const noexcept;
   void add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
+  [[nodiscard]] Block own_at_end(double softness, const Vector2& tangent) const noexcept;
   void push(const Point& point) noexcept;
   void pop() noexcept;
   void resize_last(double length_m, const Vector2& direction) noexcept;
@@ -152,15 +156,17 @@ class WorkingSet {
   std::array<Point, capacity::contacts> point_{};
   std::span<const std::uint32_t> named_{};
   std::array<Block, capacity::contacts> row_{};
-  std::array<Block, capacity::contacts> own_{};  // without the softness of its tie and the jump to its successor
-  std::size_t softened_{};                       // the contact and
-  double softened_length_m_{};                   // the length that the softness is for
+  std::array<Block, capacity::contacts> own_{};  // without the softness of its tie, the end of the line and the jump to its successor
+  std::array<Block, capacity::contacts> end_{}, half_end_{};  // to be added to it where the line ends, and while the next is half grown
+  std::size_t softened_{};                                    // the contact and
+  double softened_length_m_{};                                // the length that the softness is for
   std::array<NodeCoupling, nodes_in_use> coupling_{};
   std::size_t coupling_count_{0};
   std::uint64_t clock_{0};
   Vector2 tip_{};
   std::int32_t tip_cell_{-1};  // the last cell that held the tip
   bool tip_inside_{false};
+  bool ends_inside_{false};  // as the last segment was made
   double path_m_{0.0};
   double deepest_m_{0.0};
 };

@@ -177,7 +177,10 @@ TEST_P(InsertionBy, FrictionTakesEnergyOverClosedLoops) {
   EXPECT_GT(work, 0.002);
   EXPECT_LT(work, 2 * 2.0 * 0.015);  // the thresholds along the whole stroke
   // What the hand put in is what friction took, but for what the contacts that come and go store.
-  EXPECT_NEAR(work, slip_work, (embedded() ? 0.002 : 0.05) * work);
+  EXPECT_NEAR(work, slip_work, (embedded() ? 0.004 : 0.05) * work);
+  if (embedded()) {
+    EXPECT_GT(work, slip_work);  // what is not kept is lost: a hand gains nothing
+  }
   const std::array<Pose, 2> within_stick{{{0.0, -1e-4, 0.0}, {0.0, 1e-4, 0.0}}};
   (void)loop(within_stick);
   EXPECT_NEAR(loop(within_stick)[0], 0.0, 1e-7);  // a spring
