@@ -118,9 +118,10 @@ struct Balance {
 }
 
 // sin^2 of twice the angle between a segment and the edges that meet most squarely of the cell around its middle.
-[[nodiscard]] inline double askew_to_cell(const fem::Mesh& mesh, const contact::WorkingSet::Point& segment, double length_m) {
-  const fem::Point middle{segment.begin_m[0] + 0.5 * length_m * segment.heading[0],
-                          segment.begin_m[1] + 0.5 * length_m * segment.heading[1], 0.0};
+[[nodiscard]] inline double askew_to_cell(const fem::Mesh& mesh, const contact::WorkingSet::Point& segment, double length_m,
+                                          double beyond_m) {
+  const double way_m = 0.5 * length_m + beyond_m;
+  const fem::Point middle{segment.begin_m[0] + way_m * segment.heading[0], segment.begin_m[1] + way_m * segment.heading[1], 0.0};
   const auto& cell = mesh.element[static_cast<std::size_t>(fem::Locator(mesh).locate(middle)->element)];
   const int count = mesh.nodes_per_element();
   const auto angle = [&](int from, int to) {
