@@ -142,7 +142,7 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexce
   return before + 1;
 }
 
-// The square of the sine of twice the angle between a direction and a cell's edges; of a triangle's, those that meet most squarely.
+// sin^2 of twice the angle between a direction and a cell's edges, the mean over the two that meet most squarely.
 double WorkingSet::askew_to(const model::Cell& cell, const Vector2& direction) const noexcept {
   double least = 2.0, askew = 0.0;
   for (std::size_t k = 0; k < cell.count; ++k) {
@@ -152,8 +152,11 @@ double WorkingSet::askew_to(const model::Cell& cell, const Vector2& direction) c
     const double off_square = std::abs(dot(a, b)) / (length(a) * length(b));
     if (off_square >= least) continue;
     least = off_square;
-    const double cosine = dot(a, direction) / length(a);
-    askew = 4.0 * cosine * cosine * (1.0 - cosine * cosine);
+    const auto to = [&](const Vector2& edge) {
+      const double cosine = dot(edge, direction) / length(edge);
+      return 4.0 * cosine * cosine * (1.0 - cosine * cosine);
+    };
+    askew = 0.5 * (to(a) + to(b));
   }
   return askew;
 }

@@ -117,7 +117,7 @@ struct Balance {
   return {t[0] * axial_m - t[1] * lateral_m, t[1] * axial_m + t[0] * lateral_m};
 }
 
-// sin^2 of twice the angle between a segment and the edges that meet most squarely of the cell around its middle.
+// sin^2 of twice the angle between a segment and the edges of the cell around its middle: the mean of the two that meet most squarely.
 [[nodiscard]] inline double askew_to_cell(const fem::Mesh& mesh, const contact::WorkingSet::Point& segment, double length_m,
                                           double beyond_m) {
   const double way_m = 0.5 * length_m + beyond_m;
@@ -129,12 +129,13 @@ struct Balance {
     const fem::Point& b = mesh.node[static_cast<std::size_t>(cell[static_cast<std::size_t>(to % count)])];
     return std::atan2(b[1] - a[1], b[0] - a[0]);
   };
-  double squarest = 2.0, edge = 0.0;
+  double squarest = 2.0, edge = 0.0, other = 0.0;
   for (int k = 0; k < count; ++k) {
     const double off = std::abs(std::cos(angle(k, k + 1) - angle(k, k + count - 1)));
-    if (off < squarest) squarest = off, edge = angle(k, k + 1);
+    if (off < squarest) squarest = off, edge = angle(k, k + 1), other = angle(k, k + count - 1);
   }
-  return std::pow(std::sin(2.0 * (edge - std::atan2(segment.heading[1], segment.heading[0]))), 2);
+  const double along = std::atan2(segment.heading[1], segment.heading[0]);
+  return 0.5 * (std::pow(std::sin(2.0 * (edge - along)), 2) + std::pow(std::sin(2.0 * (other - along)), 2));
 }
 
 // What elements miss on a line load through them: a tent of height q |d| / (2 C t), interpolated, by its two components, and how they take
