@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/contact/kernels.hpp"
+
 namespace trocar::contact {
 namespace {
 
@@ -15,7 +17,9 @@ constexpr double largest_inner_tolerance_n = 0.3 * Solver::tolerance_n;
 constexpr double settled_n = tolerance(1e-13, 1e-7);  // at or below, the last forces are the solution of this tick too
 constexpr double largest_slip_start_n = 1e6;          // a contact that would begin by slipping under more begins stuck
 constexpr int most_refinements = 3;
-constexpr int block_patience = 3;  // block exchanges without fewer violations
+constexpr double proportional = tolerance(1e-8, 1e-4);  // gaps that differ by less from others' multiple, over the largest
+constexpr double largest_share = 1e3;                   // of a small correction would multiply its rounding
+constexpr int block_patience = 3;                       // block exchanges without fewer violations
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Smallest pivot over the diagonal of M: below, the unknown is as good as dependent on those before it.
 constexpr double smallest_pivot = tolerance(1e-15, 1e-6);
@@ -26,28 +30,6 @@ double quadratic(const Block& g, const Vector2& v) noexcept {
   return v[0] * (g[0] * v[0] + g[1] * v[1]) + v[1] * (g[2] * v[0] + g[3] * v[1]);
 }
 bool slipping(State state) noexcept { return state != State::Stuck; }
-
-// y[0, rows) -= x_0 a_0 + x_1 a_1 + … over `count` columns a_l, `stride` apart: four columns at a time, then the rest one by one, whatever
-// the number of rows. The sums stay in registers.
-template <std::size_t rows>
-void subtract(double* y, const double* a, std::size_t stride, const double* x, std::size_t count) noexcept {
-  std::array<double, rows> sum;
-  for (std::size_t r = 0; r < rows; ++r) sum[r] = y[r];
-  for (std::size_t k = 0; k < count / 4; ++k, x += 4, a += 4 * stride)
-    for (std::size_t r = 0; r < rows; ++r)
-      sum[r] -= (x[0] * a[r] + x[1] * a[stride + r]) + (x[2] * a[2 * stride + r] + x[3] * a[3 * stride + r]);
-  for (std::size_t k = 0; k < count % 4; ++k, ++x, a += stride)
-    for (std::size_t r = 0; r < rows; ++r) sum[r] -= *x * a[r];
-  for (std::size_t r = 0; r < rows; ++r) y[r] = sum[r];
-}
-// The same for y[begin, end), rounded up to a multiple of 4 rows.
-void subtract(double* y, std::size_t begin, std::size_t end, const double* a, std::size_t stride, const double* x,
-              std::size_t count) noexcept {
-  std::size_t r = begin;
-  for (; r + 12 < end; r += 16) subtract<16>(y + r, a + r, stride, x, count);
-  for (; r + 4 < end; r += 8) subtract<8>(y + r, a + r, stride, x, count);
-  if (r < end) subtract<4>(y + r, a + r, stride, x, count);
-}
 
 // x_0 a_0 + x_1 a_1 + … over the rows a_k
 template <std::size_t n>
@@ -78,6 +60,7 @@ void Solver::set_row(std::size_t i, std::span<const Block> row) noexcept {
   // The own block is symmetric to the bit.
   compliance_[2 * i + 1][i] = compliance_[2 * i][half + i];
   own_[i] = compliance(i, i);
+  measured_[i] = false;
   evaluated_ = false;
 }
 
@@ -90,6 +73,7 @@ void Solver::withdraw(std::size_t i) noexcept {
       order_[kept++] = order_[k];
   }
   unknowns_ = kept;
+  forget_correction();
 }
 
 void Solver::enter(std::size_t i) noexcept {
@@ -141,6 +125,7 @@ void Solver::join(const Solver& tissue, std::span<const double> softness, std::s
   tangent_y_ = tissue.tangent_y_;
   for (std::size_t i = 0; i < size_; ++i) {
     own_[i] = tissue.compliance(i, i);
+    measured_[i] = false;
     contact_[i] = tissue.contact_[i];
     put_force(i);
     enter(i);
@@ -176,6 +161,7 @@ void Solver::replace_own(std::size_t i, const Block& own) noexcept {
   compliance_[2 * i][half + i] = compliance_[2 * i + 1][i] = own[1];
   compliance_[2 * i + 1][half + i] = own[3];
   own_[i] = own;
+  measured_[i] = false;
   evaluated_ = false;
   withdraw(i);
   enter(i);
@@ -183,12 +169,14 @@ void Solver::replace_own(std::size_t i, const Block& own) noexcept {
 
 void Solver::pop() noexcept {
   --size_;
+  reaction_[2 * size_] = reaction_[2 * size_ + 1] = 0.0;  // sweeps run over it
   withdraw(size_);
   evaluated_ = false;
 }
 
 void Solver::clear() noexcept {
   size_ = unknowns_ = valid_ = 0;
+  reaction_.fill(0.0);
   evaluated_ = joined_ = false;
 }
 
@@ -230,10 +218,17 @@ void Solver::turn(std::span<const Target> target) noexcept {
     } else if (now.lower_n == now.upper_n) {
       set_state(i, State::SlipForward);
     }
-    if (tangent_x_[i] != now.tangent[0] || tangent_y_[i] != now.tangent[1]) {
+    const bool turned = tangent_x_[i] != now.tangent[0] || tangent_y_[i] != now.tangent[1];
+    if (turned || !measured_[i]) {
+      measured_[i] = true;
+      axial_stiffness_[i] = 1.0 / quadratic(own_[i], now.tangent);
+      lateral_stiffness_[i] = 1.0 / quadratic(own_[i], normal(now.tangent));
+    }
+    if (turned) {
       tangent_x_[i] = now.tangent[0];
       tangent_y_[i] = now.tangent[1];
       if (slipping(c.state)) {
+        forget_correction();
         compose_force(i, c.axial_n, c.lateral_n);
         const bool row_holds = joined_ && std::abs(row_x_[i] - now.tangent[0]) + std::abs(row_y_[i] - now.tangent[1]) <= frame_slack;
         if (!row_holds) {
@@ -268,7 +263,7 @@ void Solver::evaluate() noexcept {
   if (evaluated_) return;
   displacement_.fill(0.0);
   for (const std::size_t begin : {std::size_t{0}, half})
-    subtract(displacement_.data(), begin, begin + size_, compliance_[0].data(), stride, reaction_.data(), 2 * size_);
+    kernel::subtract(displacement_.data(), begin, begin + size_, compliance_[0].data(), stride, reaction_.data(), 2 * size_);
   evaluated_ = true;
 }
 
@@ -277,11 +272,6 @@ void Solver::assemble_rows(std::size_t first) noexcept {
   // Of M's row a: the products with x, with y and with the normal of every contact, one third each.
   alignas(64) std::array<double, 3 * half> row;
   std::array<std::uint16_t, 2 * capacity> place;
-  double* __restrict x = row.data();
-  double* __restrict y = x + half;
-  double* __restrict n = y + half;
-  const double* __restrict tx = row_x_.data();
-  const double* __restrict ty = row_y_.data();
   std::size_t contacts = 0;  // up to the last one so far, in whole vectors
   for (std::size_t a = 0; a < unknowns_; ++a) {
     const std::size_t i = order_[a].contact;
@@ -289,13 +279,8 @@ void Solver::assemble_rows(std::size_t first) noexcept {
     contacts = std::max(contacts, (i + 4) / 4 * 4);
     if (a < first) continue;
     const Vector2 v = direction(order_[a]);
-    const double* __restrict gx = compliance_[2 * i].data();
-    const double* __restrict gy = compliance_[2 * i + 1].data();
-    for (std::size_t r = 0; r < contacts; ++r) {
-      x[r] = v[0] * gx[r] + v[1] * gy[r];
-      y[r] = v[0] * gx[half + r] + v[1] * gy[half + r];
-      n[r] = tx[r] * y[r] - ty[r] * x[r];
-    }
+    kernel::project({row.data(), row.data() + half, row.data() + 2 * half}, contacts, v[0], v[1], compliance_[2 * i].data(),
+                    compliance_[2 * i + 1].data(), half, row_x_.data(), row_y_.data());
     for (std::size_t b = 0; b <= a; ++b) factor_[b][a] = row[place[b]];
   }
   for (std::size_t b = 0; b < unknowns_; ++b) std::fill_n(&factor_[b][unknowns_], 3, 0.0);  // sweeps run over them
@@ -310,7 +295,7 @@ int Solver::factorise() noexcept {
     double* column = factor_[j].data();
     // The mirror: L_jl, l < j, stands above the diagonal of this column.
     const double diagonal = column[j];
-    subtract(column, std::max(j, first), end, factor_[0].data(), stride, column, j);
+    kernel::subtract(column, std::max(j, first), end, factor_[0].data(), stride, column, j);
     if (j >= first) {
       const double least = smallest_pivot * std::abs(diagonal) + std::numeric_limits<double>::min();
       column[j] = joined_ && column[j] < -least ? column[j] : std::max(column[j], least);
@@ -344,24 +329,28 @@ void Solver::invert_block(std::size_t j) noexcept {
     for (std::size_t k = 0; k <= r; ++k) inverse.by_column[k][r] = n[r][k];
 }
 
-// One correction of the working unknowns by L D L^T x = v.(d - u).
-void Solver::solve_unknowns(std::span<const Target> target) noexcept {
+// v.(d - u) of the working unknowns, in the tick's frame, which the row of L may lag behind.
+void Solver::find_gaps(std::span<const Target> target) noexcept {
+  for (std::size_t a = 0; a < unknowns_; ++a) {
+    const std::size_t i = order_[a].contact;
+    const Vector2 gap{target[i].gap_m[0] - displacement_[i], target[i].gap_m[1] - displacement_[half + i]};
+    const bool across = order_[a].direction == Direction::Normal;
+    unknown_[a] = across ? tangent_x_[i] * gap[1] - tangent_y_[i] * gap[0] : gap[order_[a].direction == Direction::X ? 0 : 1];
+  }
+  std::fill_n(&unknown_[unknowns_], 3, 0.0);
+}
+
+// One correction of the working unknowns: gaps into forces, by L D L^T x = v.(d - u).
+void Solver::solve_unknowns() noexcept {
   double* y = unknown_.data();
   const std::size_t end = unknowns_;
   if (end == 0) return;
-  for (std::size_t a = 0; a < end; ++a) {
-    const std::size_t i = order_[a].contact;
-    const Vector2 gap{target[i].gap_m[0] - displacement_[i], target[i].gap_m[1] - displacement_[half + i]};
-    // In the tick's frame, which the row of L may lag behind.
-    const bool across = order_[a].direction == Direction::Normal;
-    y[a] = across ? tangent_x_[i] * gap[1] - tangent_y_[i] * gap[0] : gap[order_[a].direction == Direction::X ? 0 : 1];
-  }
   // By blocks of unknowns: inside of a block the inverse of its part of L, what it does to the others is one sweep over its columns.
   // Forwards z = D^-1 L^-1 y, backwards x = L^-T z, both in place.
   for (std::size_t j = 0; j < end; j += block) {
     std::array<double, block> z = times(block_inverse_[j / block].by_column, y + j);
     for (std::size_t r = 0; r < block; ++r) y[j + r] = z[r] * inverse_pivot_[j + r];
-    subtract(y, j + block, end, factor_[j].data(), stride, y + j, block);
+    kernel::subtract(y, j + block, end, factor_[j].data(), stride, y + j, block);
   }
   const std::size_t blocks = (end + block - 1) / block;
   std::fill(y + end, y + block * blocks, 0.0);
@@ -370,27 +359,60 @@ void Solver::solve_unknowns(std::span<const Target> target) noexcept {
     const std::size_t j = block * b;
     const std::array<double, block> x = times(block_inverse_[b].by_row, y + j);
     std::copy_n(x.begin(), block, y + j);
-    subtract(y, 0, j, factor_[j].data(), stride, y + j, count);
+    kernel::subtract(y, 0, j, factor_[j].data(), stride, y + j, count);
     count = block;
   }
-  for (std::size_t a = 0; a < end; ++a) {
+}
+
+void Solver::add_correction() noexcept {
+  for (std::size_t a = 0; a < unknowns_; ++a) {
     const std::size_t i = order_[a].contact;
     if (order_[a].direction == Direction::Normal) {
-      compose_force(i, contact_[i].axial_n, contact_[i].lateral_n + y[a]);
+      compose_force(i, contact_[i].axial_n, contact_[i].lateral_n + unknown_[a]);
     } else {
-      contact_[i].force_n[order_[a].direction == Direction::X ? 0 : 1] += y[a];
+      contact_[i].force_n[order_[a].direction == Direction::X ? 0 : 1] += unknown_[a];
       resolve_force(i);
       put_force(i);
     }
   }
 }
 
+void Solver::begin_correction() noexcept {
+  std::copy_n(unknown_.begin(), unknowns_, last_gap_.begin());
+  std::fill_n(&last_gap_[unknowns_], 3, 0.0);
+  for (const std::size_t begin : {std::size_t{0}, half})
+    for (std::size_t k = begin; k < begin + size_; ++k) last_move_[k] = -displacement_[k];
+}
+
+void Solver::keep_correction() noexcept {
+  std::copy_n(unknown_.begin(), unknowns_, last_correction_.begin());
+  for (const std::size_t begin : {std::size_t{0}, half})
+    for (std::size_t k = begin; k < begin + size_; ++k) last_move_[k] += displacement_[k];
+  repeats_ = 0;
+  correction_holds_ = true;
+}
+
+// The last correction in proportion, where the gaps are, up to what rounding makes of them. The factor is still that of then.
+bool Solver::repeat_correction(std::span<const Target> target) noexcept {
+  if (!correction_holds_) return false;
+  find_gaps(target);
+  const kernel::Proportion found = kernel::proportion(unknown_.data(), last_gap_.data(), unknowns_);
+  if (!(std::abs(found.share) < largest_share) || !(found.rest <= proportional * found.largest)) return false;
+  const double share = found.share;
+  for (std::size_t a = 0; a < unknowns_; ++a) unknown_[a] = share * last_correction_[a];
+  add_correction();
+  for (const std::size_t begin : {std::size_t{0}, half})
+    for (std::size_t k = begin; k < begin + size_; ++k) displacement_[k] += share * last_move_[k];
+  evaluated_ = ++repeats_ % most_repeats != 0;
+  evaluate();
+  return true;
+}
+
 void Solver::judge(std::span<const Target> target, double enough_n, Violations& v) noexcept {
   v.count = 0;
   v.free_residual_n = v.residual_n = 0.0;
-  double largest_force_n = 0.0;
-  for (std::size_t k = 0; k < 2 * size_; ++k) largest_force_n = std::max(largest_force_n, std::abs(reaction_[k]));
-  const double least_n = std::clamp(rounding_digits * largest_force_n, inner_tolerance_n, largest_inner_tolerance_n);
+  const double least_n =
+      std::clamp(rounding_digits * kernel::largest(reaction_.data(), 2 * size_), inner_tolerance_n, largest_inner_tolerance_n);
   v.tolerance_n = least_n;
   for (std::size_t i = 0; i < size_ && v.residual_n <= enough_n; ++i) {
     Contact& c = contact_[i];
@@ -398,10 +420,9 @@ void Solver::judge(std::span<const Target> target, double enough_n, Violations& 
     const Vector2 t{tangent_x_[i], tangent_y_[i]};
     const Vector2 n = normal(t);
     const Vector2 gap{at.gap_m[0] - displacement_[i], at.gap_m[1] - displacement_[half + i]};
-    const Block& own = own_[i];
     c.slip_m = dot(t, gap);
-    const double axial_gap_n = c.slip_m / quadratic(own, t);
-    const double lateral_n = std::abs(dot(n, gap)) / quadratic(own, n);
+    const double axial_gap_n = c.slip_m * axial_stiffness_[i];
+    const double lateral_n = std::abs(dot(n, gap)) * lateral_stiffness_[i];
     const double axial_n = std::abs(c.axial_n - std::clamp(c.axial_n + axial_gap_n, at.lower_n, at.upper_n));
     v.free_residual_n = std::max({v.free_residual_n, lateral_n, slipping(c.state) ? 0.0 : std::abs(axial_gap_n)});
     v.residual_n = std::max({v.residual_n, lateral_n, axial_n});
@@ -427,11 +448,27 @@ void Solver::judge(std::span<const Target> target, double enough_n, Violations& 
 
 // The working unknowns of the present states, refined to the floor of rounding.
 void Solver::correct(std::span<const Target> target, Violations& v, Solution& solution) noexcept {
-  solution.rows_factored += factorise();
+  // Where every tick makes its factor anew, no correction is worth keeping.
+  const bool keep = valid_ == unknowns_;
+  if (!keep) {
+    solution.rows_factored += factorise();
+    forget_correction();
+  } else if (repeat_correction(target)) {
+    judge(target, infinity, v);
+    ++solution.iterations;
+    solution.repeated = v.free_residual_n <= v.tolerance_n;
+    if (solution.repeated) return;
+    evaluated_ = false;
+    evaluate();
+  }
   double unrefined_n = infinity;
   for (int k = 0; k <= most_refinements && solution.iterations < max_iterations; ++k) {
-    solve_unknowns(target);
+    find_gaps(target);
+    if (k == 0 && keep) begin_correction();
+    solve_unknowns();
+    add_correction();
     evaluate();
+    if (k == 0 && keep) keep_correction();
     judge(target, infinity, v);
     ++solution.iterations;
     if (v.free_residual_n <= v.tolerance_n || v.free_residual_n > 0.5 * unrefined_n) break;

@@ -15,6 +15,9 @@
 // behind the changed contact and continues it from the pristine G, a turn of the needle leaves the stuck contacts' rows as they are, and
 // nothing drifts however many exchanges there were.
 //
+// A needle that goes straight on moves all its gaps in proportion to the tick before. Then the last correction is repeated in proportion,
+// forces and displacements, in O(s); the residual is judged as ever, and decides.
+//
 // Fixed size, no allocation, bounded loops. Sums run in one order: same inputs, same bits.
 #pragma once
 
@@ -61,6 +64,7 @@ struct Solution {
   int iterations{};     // solves with the factor
   int descents{};       // steps of the active-set method, where block pivoting did not end
   int rows_factored{};  // rows of L that had to be computed
+  bool repeated{};      // the last correction in proportion was the solution
   double residual_n{};
 };
 
@@ -109,6 +113,8 @@ class Solver {
 
   // Skipping: the next solve computes every row of L again, in the same order. Changes no bit of the result.
   void forget_factor() noexcept { valid_ = 0; }
+  // Skipping: the next solve does not repeat the last correction. Changes its result by rounding.
+  void forget_correction() noexcept { correction_holds_ = false; }
   // Largest difference between L and one made afresh from G in the same order, relative to its largest entry. For tests: O(s^3).
   [[nodiscard]] double factor_drift() noexcept;
 
@@ -138,7 +144,12 @@ class Solver {
   int factorise() noexcept;
   void invert_block(std::size_t first) noexcept;
   void assemble_rows(std::size_t first) noexcept;
-  void solve_unknowns(std::span<const Target> target) noexcept;
+  void find_gaps(std::span<const Target> target) noexcept;
+  void solve_unknowns() noexcept;
+  void add_correction() noexcept;
+  void begin_correction() noexcept;
+  void keep_correction() noexcept;
+  bool repeat_correction(std::span<const Target> target) noexcept;
   void cut_to_bounds(std::span<const Target> target) noexcept;
   struct Violations {
     int count{};
@@ -167,8 +178,10 @@ class Solver {
   alignas(64) Column displacement_{}, unknown_{};
   alignas(64) std::array<double, 2 * capacity> reaction_{};  // -f: x and y of contact 0, of contact 1, …
   alignas(64) std::array<double, half> tangent_x_{}, tangent_y_{};
-  alignas(64) std::array<double, half> row_x_{}, row_y_{};  // tangents that the rows of L were made with
-  std::array<Block, capacity> own_{};                       // compliances by which residuals are measured
+  alignas(64) std::array<double, half> row_x_{}, row_y_{};                // tangents that the rows of L were made with
+  std::array<Block, capacity> own_{};                                     // compliances by which residuals are measured
+  std::array<double, capacity> axial_stiffness_{}, lateral_stiffness_{};  // their inverses in the frames of the tick, where measured_
+  std::array<bool, capacity> measured_{};
   std::array<double, 2 * capacity> inverse_pivot_{};
   static constexpr std::size_t block = 8;
   struct BlockInverse {
@@ -176,6 +189,11 @@ class Solver {
   };
   alignas(64) std::array<BlockInverse, 2 * capacity / block> block_inverse_{};  // of L's diagonal blocks
   std::array<Unknown, 2 * capacity> order_{};
+  // The last correction of a whole factor: gaps of the unknowns, the forces that closed them, and the displacements that these caused.
+  alignas(64) Column last_gap_{}, last_correction_{}, last_move_{};
+  static constexpr int most_repeats = 16;  // before displacements are summed afresh
+  int repeats_{0};
+  bool correction_holds_{false};
   std::array<Contact, capacity> contact_{};
   bool evaluated_{true};
   bool joined_{false};

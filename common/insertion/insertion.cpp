@@ -238,6 +238,7 @@ void Insertion::solve_rigid(Result& result) noexcept {
   }
   if (!skip_) {
     set_.solver().forget_factor();
+    set_.solver().forget_correction();
     if (rests_) release();
   }
   const contact::Solution solution = set_.solver().solve({target_.data(), n});

@@ -146,6 +146,52 @@ TEST(SolverSequence, ForgettingTheFactorChangesNoBit) {
   EXPECT_LT(kept_rows, forgotten_rows);  // the comparison compares something
 }
 
+// To and fro along one direction, at uneven speed, with bounds that some contacts reach: mostly the last correction is repeated, and what
+// it finds is what a solve finds.
+TEST(SolverSequence, RepeatingTheCorrectionChangesRoundingAlone) {
+  reference::Random random(24);
+  const std::size_t s = 30;
+  const Eigen::MatrixXd g = reference::random_compliance(random, s, 1e4);
+  const auto repeats = solver_of(g);
+  const auto solves = solver_of(g);
+  std::vector<reference::Contact> contact = random_contacts(random, s);
+  std::vector<std::array<double, 2>> way(s);
+  for (std::size_t i = 0; i < s; ++i) way[i] = {random.uniform(-1e-4, 1e-4), random.uniform(-1e-4, 1e-4)};
+  int repeated = 0, exchanged = 0;
+  double last = 0.0;
+  for (int k = 1; k <= 2000; ++k) {
+    const double now = 3.0 * std::sin(k / 150.0);
+    for (std::size_t i = 0; i < s; ++i)
+      for (std::size_t c = 0; c < 2; ++c) contact[i].gap_m[c] += (now - last) * way[i][c];
+    last = now;
+    solves->forget_correction();
+    const Solution a = repeats->solve(targets_of(contact)), b = solves->solve(targets_of(contact));
+    repeated += a.repeated ? 1 : 0;
+    exchanged += a.pivots;
+    ASSERT_FALSE(b.repeated);
+    ASSERT_EQ(a.status, SolverStatus::Ok);
+    ASSERT_LE(a.residual_n, 1e-10);
+    double largest = 0.0, apart = 0.0, off = 0.0;
+    for (std::size_t i = 0; i < s; ++i) {
+      ASSERT_EQ(repeats->contact(i).state, solves->contact(i).state) << k;
+      for (std::size_t c = 0; c < 2; ++c) {
+        largest = std::max(largest, std::abs(solves->contact(i).force_n[c]));
+        apart = std::max(apart, std::abs(repeats->contact(i).force_n[c] - solves->contact(i).force_n[c]));
+        // The displacements that it carries along are those of its forces.
+        double u = 0.0;
+        for (std::size_t j = 0; j < s; ++j)
+          for (std::size_t d = 0; d < 2; ++d)
+            u += g(static_cast<Eigen::Index>(2 * i + c), static_cast<Eigen::Index>(2 * j + d)) * repeats->contact(j).force_n[d];
+        off = std::max(off, std::abs(u - repeats->displacement_m(i)[c]));
+      }
+    }
+    ASSERT_LE(apart, 1e-9 * largest) << k;
+    ASSERT_LE(off, 1e-14) << k;
+  }
+  EXPECT_GT(repeated, 1000);
+  EXPECT_GT(exchanged, 20);
+}
+
 // Rows of L depend on G and the order alone: a solver that went another way to the same order has the same bits.
 TEST(SolverSequence, HistoryDoesNotShow) {
   reference::Random random(16);
