@@ -33,6 +33,7 @@ class Bench {
 
   void references();
   void errors();
+  void conforming();
   void solids();
   bool finish();  // whether the force is continuous
 
@@ -47,7 +48,7 @@ class Bench {
   std::vector<fem::Point> places_{visible_points()};
   std::vector<std::vector<Answer>> reference_{};  // of each path, of each depth
   std::vector<ReferenceRow> reference_rows_{};
-  std::vector<ErrorRow> errors_{};
+  std::vector<ErrorRow> errors_{}, conforming_{};
   std::vector<CourseRow> courses_{};
   std::vector<SolidAnswer> solids_{};
   std::vector<Claim> claims_{};
@@ -155,6 +156,32 @@ void Bench::claims() {
       }
 }
 
+// What nodes as contacts can do at best at an element size: a grid line runs along the needle and its tip is a node, so that there is
+// nothing to snap or to adapt.
+void Bench::conforming() {
+  const Path path = paths().front();
+  const std::vector<double> depth_m = {0.025, 0.03};
+  std::vector<Answer> right;
+  for (const double depth : depth_m) right.push_back(fine_answer(path, depth, options_.quick ? 1 : 2, places_));
+  for (const fem::Type type : {fem::Type::Tri3, fem::Type::Quad4})
+    for (const int side : sides_) {
+      const double h_m = side_m / (side - 1);
+      if (std::abs(std::remainder(depth_m.front(), h_m)) > 1e-9) continue;
+      const Compiled compiled(block_scene(type, side, path));
+      ErrorRow row{"conforming", element_name(type), side, "nodes", {}, {}, 0.0, 0, {}};
+      for (std::size_t k = 0; k < depth_m.size(); ++k) {
+        std::vector<bool> counts;
+        for (const fem::Point& x : places_) counts.push_back(distance_to_shaft_m(path, depth_m[k], x) >= 2.0 * h_m);
+        const Asked asked = coarse_answer(compiled, Method::Snap, path, depth_m[k], places_);
+        const Metrics off = compare(asked.answer, right[k], counts);
+        for (std::size_t m = 0; m < off.size(); ++m) row.error[m] += off[m] * off[m] / static_cast<double>(depth_m.size());
+        row.contacts = std::max(row.contacts, asked.contacts);
+      }
+      for (double& each : row.error) each = std::sqrt(each);
+      conforming_.push_back(row);
+    }
+}
+
 void Bench::solids() {
   for (const double ratio : options_.quick ? std::vector{0.5, 1.0} : std::vector{0.5, 1.0, 2.0, 4.0}) {
     fmt::print(stderr, "  radius / element size {} …\n", ratio);
@@ -166,6 +193,7 @@ bool Bench::finish() {
   print(reference_rows_);
   print(errors_);
   print(claims_);
+  print_conforming(conforming_, errors_);
   print_convergence(errors_, solids_);
   const double worst_mn = print(courses_);
   write(options_.out, reference_rows_, errors_, courses_, solids_);
@@ -180,6 +208,7 @@ int run(const Options& options) {
   const auto step = [](const char* what, const std::function<void()>& work) { bench::step("accuracy_benchmark", what, work); };
   step("fine conforming meshes", [&] { bench.references(); });
   step("path methods", [&] { bench.errors(); });
+  step("conforming grids", [&] { bench.conforming(); });
   step("a solid", [&] { bench.solids(); });
   return bench.finish() ? 0 : 1;
 }

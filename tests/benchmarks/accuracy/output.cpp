@@ -87,6 +87,27 @@ void print(const std::vector<Claim>& claims) {
   }
 }
 
+void print_conforming(const std::vector<ErrorRow>& conforming, const std::vector<ErrorRow>& errors) {
+  fmt::print(
+      "\nThe floor of nodes as contacts: a grid line along the needle, a node at its tip, nothing to snap or to adapt; and how many times\n"
+      "worse snap is on oblique paths at the same element size. What does not reach 5 here, no moving of nodes reaches.\n"
+      "{:<5} {:>4}",
+      "cells", "side");
+  for (std::size_t m = 0; m + 1 < metric_name.size(); ++m) fmt::print(" {:>18}", metric_name[m]);
+  fmt::print("\n");
+  for (const ErrorRow& c : conforming) {
+    fmt::print("{:<5} {:>4}", c.element, c.side);
+    for (std::size_t m = 0; m + 1 < metric_name.size(); ++m) {
+      double snap = 0.0, count = 0.0;
+      for (const ErrorRow& e : errors)
+        if (e.method == "snap" && e.element == c.element && e.side == c.side && e.path.starts_with("oblique"))
+          snap += std::log(e.error[m]), count += 1.0;
+      fmt::print(" {:>8.3f} % {:>5.1f} x", 100.0 * c.error[m], std::exp(snap / count) / c.error[m]);
+    }
+    fmt::print("\n");
+  }
+}
+
 void print_convergence(const std::vector<ErrorRow>& rows, const std::vector<SolidAnswer>& solids) {
   fmt::print(
       "\nEmbedded, plane: errors halve with the elements (segments are an edge long); observed order between meshes of h and h / 2\n");

@@ -49,6 +49,8 @@ struct Claim {
 void print(const std::vector<ReferenceRow>& rows);
 void print(const std::vector<ErrorRow>& rows);
 void print(const std::vector<Claim>& claims);
+// Against snap on oblique paths at the same element size.
+void print_conforming(const std::vector<ErrorRow>& conforming, const std::vector<ErrorRow>& errors);
 void print_convergence(const std::vector<ErrorRow>& rows, const std::vector<SolidAnswer>& solids);
 double print(const std::vector<CourseRow>& rows);  // worst jump of the embedded method, mN
 
