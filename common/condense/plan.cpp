@@ -120,7 +120,9 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
   // One force per edge would alternate along the path: the edges' averages hardly feel such a load (inf-sup). In planar tissue the contacts
   // are stabilised against it (contact/working_set.hpp); in a solid 1.5 edges keep it off, and 2 cost detail.
   const double edges_per_segment = scene.tissue.model == fem::Model::Solid ? 1.5 : 1.0;
-  if (!given) plan.law.spacing_m = std::max(edges_per_segment * c.edge_length_m, reach / static_cast<double>(capacity::contacts));
+  const double edge_m =
+      c.edge_length_m * (c.cell.front().count == 3 && scene.tissue.model != fem::Model::Solid ? model::square_of_triangles : 1.0);
+  if (!given) plan.law.spacing_m = std::max(edges_per_segment * edge_m, reach / static_cast<double>(capacity::contacts));
   if (plan.law.explicit_count > capacity::contacts)
     throw fem::Error(
         fmt::format("contact.points_m has {} contacts and the capacity is {}; give fewer", plan.law.explicit_count, capacity::contacts));

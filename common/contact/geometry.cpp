@@ -73,6 +73,15 @@ bool Geometry::inside(std::int32_t cell, const Vector2& x_m) const noexcept {
 }
 
 // A moved node's cells may reach into buckets that do not list them.
+bool Geometry::on_surface(std::uint32_t node) const noexcept {
+  for (std::uint32_t k = tissue_->ring_begin[node]; k < tissue_->ring_begin[node + 1]; ++k) {
+    const model::Cell& cell = tissue_->cell[tissue_->ring_cell[k]];
+    for (std::size_t edge = 0; edge < cell.count; ++edge)
+      if (cell.neighbour[edge] == model::surface && (cell.node[edge] == node || cell.node[(edge + 1) % cell.count] == node)) return true;
+  }
+  return false;
+}
+
 std::int32_t Geometry::search_moved_rings(const Vector2& x_m) const noexcept {
   for (std::size_t m = 0; m < moved_count_; ++m) {
     const std::uint32_t node = moved_[m].node;

@@ -40,6 +40,8 @@ class Geometry {
   void open(const model::Tissue& tissue) noexcept;
 
   [[nodiscard]] Vector2 node_m(std::uint32_t node) const noexcept;
+  // Whether an edge that no tissue lies beyond ends at this node.
+  [[nodiscard]] bool on_surface(std::uint32_t node) const noexcept;
   // The cell that holds x, looked for first in `hint` when that is a cell; -1 when no candidate cell does.
   [[nodiscard]] std::int32_t locate(const Vector2& x_m, std::int32_t hint) const noexcept;
   [[nodiscard]] bool inside(std::int32_t cell, const Vector2& x_m) const noexcept;

@@ -117,16 +117,25 @@ class WorkingSet {
     std::uint64_t used{};
     std::array<Block, capacity::contacts> block{};
   };
+  struct LineEnd {  // what is to be added to a segment's own compliance where the line ends, m/N
+    Vector2 tangent{};
+    double along{}, across{};
+    double line{};  // the line's own, as far as the end counts
+  };
   static constexpr std::size_t nodes_in_use = 48;
 
   [[nodiscard]] bool segments() const noexcept { return law_->method == Method::Embedded && law_->explicit_count == 0; }
+  [[nodiscard]] bool adapts() const noexcept { return law_->method == Method::Adapt && law_->explicit_count == 0; }
   const NodeCoupling& coupling_of(std::uint32_t node) noexcept;
   void forget_couplings(std::size_t from_contact) noexcept;
   [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
   std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
+  [[nodiscard]] double cell_edge_m(const model::Cell& cell) const noexcept;
   [[nodiscard]] double askew_to(const model::Cell& cell, const Vector2& direction) const noexcept;
   void add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
   [[nodiscard]] Block own_at_end(double softness, const Vector2& tangent) const noexcept;
+  [[nodiscard]] double yields_held(const Vector2& direction) const noexcept;
+  [[nodiscard]] Block own_at_tip() const noexcept;
   void push(const Point& point) noexcept;
   void pop() noexcept;
   void resize_last(double length_m, const Vector2& direction) noexcept;
@@ -157,9 +166,9 @@ class WorkingSet {
   std::span<const std::uint32_t> named_{};
   std::array<Block, capacity::contacts> row_{};
   std::array<Block, capacity::contacts> own_{};  // without the softness of its tie, the end of the line and the jump to its successor
-  std::array<Block, capacity::contacts> end_{}, half_end_{};  // to be added to it where the line ends, and while the next is half grown
-  std::size_t softened_{};                                    // the contact and
-  double softened_length_m_{};                                // the length that the softness is for
+  std::array<LineEnd, capacity::contacts> end_{};
+  std::size_t softened_{};      // the contact and
+  double softened_length_m_{};  // the length that the softness is for
   std::array<NodeCoupling, nodes_in_use> coupling_{};
   std::size_t coupling_count_{0};
   std::uint64_t clock_{0};

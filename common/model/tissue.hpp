@@ -26,6 +26,9 @@ struct Cell {  // triangle or quad, counter-clockwise
   std::uint16_t material{};
 };
 
+// Where two triangles make a square: its edge over the mean of the triangles' edges.
+inline constexpr double square_of_triangles = 0.88;
+
 inline constexpr std::uint8_t fixed_x = 1;
 inline constexpr std::uint8_t fixed_y = 2;
 inline constexpr std::uint8_t whole_ring = 4;  // all cells around this node are candidates, at most capacity::ring_cells: it may be moved

@@ -22,7 +22,7 @@
 //     triangles, such as 980e6 as printed, and without it they get the compliance of the tube in its material
 //   [contact] (method = "embedded" | "snap" | "adapt" | "subdivide"), shaft_n_per_m, tip_n_per_m, tip_zone_m,
 //     (velocity_law = "none" or a name below),
-//     (spacing_m: of embedded contacts, an edge unless stated, 1.5 in a solid),
+//     (spacing_m: of embedded contacts; unless stated an edge, 0.88 of triangles' mean one, 1.5 in a solid),
 //     (points_m = [[x, y], …] with slip_force_n = […]: explicit contacts, and the three densities may be left out),
 //     (corridor = { from_m, to_m, half_width_m }), (plane_z_m), (visible = side, group or "all"), (storage = "float64" | "float32")
 //   [[velocity_law]] name, speed_m_s, shaft_n_per_m, tip_n_per_m: three arrays of one length, speeds increasing. With a law its densities

@@ -101,7 +101,10 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
     for (const int n : fine.shaft) prescribed.block<2, 2>(2 * n, 0) << tx, -ty, ty, tx;
     const Eigen::MatrixXd u = statics.solve(Eigen::MatrixXd::Zero(statics.degrees_of_freedom(), 2), prescribed);
     const Eigen::MatrixXd f = statics.stiffness_n_per_m() * u;
+    answer.force_n.resize(2 * static_cast<Eigen::Index>(fine.shaft.size()), 3);
     for (const int n : fine.shaft) {
+      answer.force_n.block<2, 2>(2 * static_cast<Eigen::Index>(answer.shaft_m.size()), 0) = f.block<2, 2>(2 * n, 0);
+      answer.shaft_m.push_back(fine.mesh.node[static_cast<std::size_t>(n)]);
       answer.axial_n_per_m += tx * f(2 * n, 0) + ty * f(2 * n + 1, 0);
       answer.lateral_n_per_m += -ty * f(2 * n, 1) + tx * f(2 * n + 1, 1);
     }
@@ -139,6 +142,7 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
   }
   const reference::Solution found = reference::projected_gauss_seidel(qp, 1e-9, 3000);
   if (!found.solved) throw std::runtime_error("the fine mesh's stick-slip problem was not solved");
+  answer.force_n.col(2) = found.force_n;
   Eigen::VectorXd f = Eigen::VectorXd::Zero(statics.degrees_of_freedom());
   for (Eigen::Index i = 0; i < s; ++i) {
     f.segment<2>(2 * fine.shaft[static_cast<std::size_t>(i)]) = found.force_n.segment<2>(2 * i);
@@ -150,6 +154,20 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
   const Eigen::VectorXd u = statics.solve(f);
   answer.slip_visible_m = displacement_at(locator, u, places);
   answer.tip_m = tx * u(2 * fine.shaft.back()) + ty * u(2 * fine.shaft.back() + 1);
+  return answer;
+}
+
+Answer extrapolated(const Answer& coarser, const Answer& finer) {
+  constexpr double more = 1.0 / (2.9 - 1.0);
+  const auto beyond = [](const auto& from, const auto& to) { return to + more * (to - from); };
+  Answer answer = finer;
+  answer.axial_n_per_m = beyond(coarser.axial_n_per_m, finer.axial_n_per_m);
+  answer.lateral_n_per_m = beyond(coarser.lateral_n_per_m, finer.lateral_n_per_m);
+  answer.slip_force_n = beyond(coarser.slip_force_n, finer.slip_force_n);
+  answer.tip_m = beyond(coarser.tip_m, finer.tip_m);
+  answer.axial_visible += more * (finer.axial_visible - coarser.axial_visible);
+  answer.lateral_visible += more * (finer.lateral_visible - coarser.lateral_visible);
+  answer.slip_visible_m += more * (finer.slip_visible_m - coarser.slip_visible_m);
   return answer;
 }
 

@@ -14,12 +14,13 @@ namespace trocar::bench {
 // Relative errors. Visible: root of the sum of squares over places at least two elements from the shaft, over that of the reference.
 inline constexpr std::array<const char*, 7> metric_name{"axial_stiffness", "lateral_stiffness", "visible_axial", "visible_lateral",
                                                         "visible_slip",    "slip_force",        "slip_tip"};
+inline constexpr int first_visible = 2;  // of three
 using Metrics = std::array<double, metric_name.size()>;
 
 struct ReferenceRow {
   std::string path{};
   double slipping{};  // share of the thresholds that is reached
-  Metrics change{};   // between two refinements, the largest over all depths
+  Metrics change{};   // of the extrapolation, from one refinement to the next; the largest over all depths
 };
 
 struct ErrorRow {
@@ -40,17 +41,17 @@ struct CourseRow {
   Course course{};
 };
 
-// How many times smaller the first one's error is, in the geometric mean over meshes and paths.
+// Errors in the geometric mean over meshes and paths, and what the reference itself may be wrong by.
 struct Claim {
   std::string element{}, paths{}, metric{};
-  double embedded_over_adapt{}, embedded_over_snap{}, adapt_over_snap{};
+  double embedded{}, adapt{}, snap{}, tolerance{};
 };
 
 void print(const std::vector<ReferenceRow>& rows);
 void print(const std::vector<ErrorRow>& rows);
 void print(const std::vector<Claim>& claims);
-// Against snap on oblique paths at the same element size.
-void print_conforming(const std::vector<ErrorRow>& conforming, const std::vector<ErrorRow>& errors);
+// Beside the errors of the path methods on the same oblique paths.
+void print_alone(const std::vector<ErrorRow>& alone, const std::vector<ErrorRow>& errors);
 void print_convergence(const std::vector<ErrorRow>& rows, const std::vector<SolidAnswer>& solids);
 double print(const std::vector<CourseRow>& rows);  // worst jump of the embedded method, mN
 

@@ -155,8 +155,10 @@ struct Balance {
              : yield_m(whole, segment, {(1.0 + 0.03 * askew) * ridge, (1.0 - 0.4 * askew) * ridge}, force_n);
 }
 
-// Of segment i over the jumps of density to its neighbours, all of them whole and the spacing being the mesh's.
+// Of segment i over the jumps of density to its neighbours, all of them whole and the spacing being the mesh's mean edge.
 [[nodiscard]] inline Vector2 jump_m(const reference::GridImage& whole, const contact::WorkingSet& set, std::size_t i) {
+  const double per_edge = whole.mesh().type == fem::Type::Tri3 ? 0.88 : 1.0;
+  const double of_jump = 0.15 * per_edge * per_edge;
   const auto course = [&](std::size_t k) { return std::hypot(set.point(k).heading[0], set.point(k).heading[1]); };
   Vector2 sum{};
   for (const std::size_t later : {i, i + 1}) {
@@ -164,7 +166,7 @@ struct Balance {
     const double share = course(later) / course(later - 1);
     const Vector2& f = set.solver().contact(later).force_n;
     const Vector2& g = set.solver().contact(later - 1).force_n;
-    const Vector2 u = yield_m(whole, set.point(later), {0.15, 0.15}, {f[0] - share * g[0], f[1] - share * g[1]});
+    const Vector2 u = yield_m(whole, set.point(later), {of_jump, of_jump}, {f[0] - share * g[0], f[1] - share * g[1]});
     const double sign = later == i ? 1.0 : -share;
     sum = {sum[0] + sign * u[0], sum[1] + sign * u[1]};
   }
