@@ -259,6 +259,7 @@ void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, cons
 void WorkingSet::push(const Point& point) noexcept {
   const std::size_t i = size();
   if (adapts() && i > 0) solver_.replace_own(i - 1, own_[i - 1]);
+  yields_known_ = false;
   const std::size_t count = make_row(point.at, i);
   if (segments()) add_unresolved(point.at, point.begin_m, plus(point.begin_m, scaled(point.heading, point.length_m)), i);
   point_[i] = point;
@@ -268,6 +269,7 @@ void WorkingSet::push(const Point& point) noexcept {
 
 void WorkingSet::pop() noexcept {
   solver_.pop();
+  yields_known_ = false;
   forget_couplings(size());
   // What is the last one now was a whole segment: its tie is not softened.
   if (size() > 0 && segments()) solver_.replace_own(size() - 1, own_at_end(0.0, {1.0, 0.0}));
@@ -282,20 +284,23 @@ Block WorkingSet::own_at_end(double softness, const Vector2& tangent) const noex
   return own;
 }
 
-// What the last contact yields in a direction while the few before it are held.
-double WorkingSet::yields_held(const Vector2& direction) const noexcept {
+// What the last contact yields along a unit vector and across it, while its other direction and the few contacts before it are held.
+Vector2 WorkingSet::yields_held(const Vector2& t) const noexcept {
   constexpr std::size_t few = 5;
-  const std::size_t count = std::min(size(), few), first = size() - count;
-  std::array<std::array<double, few>, few> lower{};  // Cholesky's
+  const std::size_t first = size() - std::min(size(), few), count = 2 * (size() - first);
+  const std::array<Vector2, 2> axes{t, {-t[1], t[0]}};
+  std::array<std::array<double, 2 * few>, 2 * few> lower{};  // Cholesky's
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t j = 0; j <= i; ++j) {
-      const Block g = i == j ? own_[first + i] : solver_.compliance(first + i, first + j);
-      double rest = direction[0] * (g[0] * direction[0] + g[1] * direction[1]) + direction[1] * (g[2] * direction[0] + g[3] * direction[1]);
+      const Block g = i / 2 == j / 2 ? own_[first + i / 2] : solver_.compliance(first + i / 2, first + j / 2);
+      const Vector2 &a = axes[i % 2], &b = axes[j % 2];
+      double rest = a[0] * (g[0] * b[0] + g[1] * b[1]) + a[1] * (g[2] * b[0] + g[3] * b[1]);
       for (std::size_t k = 0; k < j; ++k) rest -= lower[i][k] * lower[j][k];
-      if (i == j && !(rest > 0.0)) return 0.0;
+      if (i == j && !(rest > 0.0)) return {};
       lower[i][j] = i == j ? std::sqrt(rest) : rest / lower[j][j];
     }
-  return lower[count - 1][count - 1] * lower[count - 1][count - 1];
+  const double along = lower[count - 2][count - 2], between = lower[count - 1][count - 2], across = lower[count - 1][count - 1];
+  return {along * along * across * across / (across * across + between * between), across * across};
 }
 
 // Of the last node that was moved onto the shaft, with the piece of the line from it to the tip. To a line of nodes it is the same to be
@@ -316,12 +321,16 @@ Block WorkingSet::own_at_tip() const noexcept {
   };
   const double excess_across = unresolved.excess_across - unresolved.excess_across_askew * askew_to(cell, t);
   Block own = own_[i];
-  add(own, in_axes(t, yields_held(t) * gives(unresolved.excess_along), yields_held({-t[1], t[0]}) * gives(excess_across)));
+  add(own, in_axes(t, yields_[0] * gives(unresolved.excess_along), yields_[1] * gives(excess_across)));
   return own;
 }
 
 void WorkingSet::soften_last(const Vector2& tangent) noexcept {
-  if (adapts()) solver_.replace_own(size() - 1, own_at_tip());
+  if (adapts()) {
+    if (!yields_known_) yields_ = yields_held(point_[size() - 1].direction);
+    yields_known_ = true;
+    solver_.replace_own(size() - 1, own_at_tip());
+  }
   if (!segments()) return;
   const std::size_t i = size() - 1;
   const double spacing = law_->spacing_m;

@@ -137,7 +137,7 @@ class WorkingSet {
   [[nodiscard]] double askew_to(const model::Cell& cell, const Vector2& direction) const noexcept;
   void add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
   [[nodiscard]] Block own_at_end(double softness, const Vector2& tangent) const noexcept;
-  [[nodiscard]] double yields_held(const Vector2& direction) const noexcept;
+  [[nodiscard]] Vector2 yields_held(const Vector2& t) const noexcept;
   [[nodiscard]] Block own_at_tip() const noexcept;
   void push(const Point& point) noexcept;
   void pop() noexcept;
@@ -170,6 +170,8 @@ class WorkingSet {
   std::array<Block, capacity::contacts> row_{};
   std::array<Block, capacity::contacts> own_{};  // without the softness of its tie, the end of the line and the jump to its successor
   std::array<LineEnd, capacity::contacts> end_{};
+  Vector2 yields_{};  // adapt: the last contact, along the path and across it, m/N
+  bool yields_known_{false};
   std::size_t softened_{};      // the contact and
   double softened_length_m_{};  // the length that the softness is for
   std::array<NodeCoupling, nodes_in_use> coupling_{};
