@@ -9,7 +9,6 @@
 namespace trocar::contact {
 namespace {
 
-Vector2 minus(const Vector2& a, const Vector2& b) noexcept { return {a[0] - b[0], a[1] - b[1]}; }
 double cross(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[1] - a[1] * b[0]; }
 
 void add(Embedding& sum, std::uint32_t node, double weight) noexcept {
@@ -72,7 +71,6 @@ bool Geometry::inside(std::int32_t cell, const Vector2& x_m) const noexcept {
   return true;
 }
 
-// A moved node's cells may reach into buckets that do not list them.
 bool Geometry::on_surface(std::uint32_t node) const noexcept {
   for (std::uint32_t k = tissue_->ring_begin[node]; k < tissue_->ring_begin[node + 1]; ++k) {
     const model::Cell& cell = tissue_->cell[tissue_->ring_cell[k]];
@@ -82,6 +80,7 @@ bool Geometry::on_surface(std::uint32_t node) const noexcept {
   return false;
 }
 
+// A moved node's cells may reach into buckets that do not list them.
 std::int32_t Geometry::search_moved_rings(const Vector2& x_m) const noexcept {
   for (std::size_t m = 0; m < moved_count_; ++m) {
     const std::uint32_t node = moved_[m].node;

@@ -6,12 +6,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "common/contact/vector.hpp"
 #include "common/core/capacities.hpp"
 #include "common/model/tissue.hpp"
 
 namespace trocar::contact {
-
-using Vector2 = std::array<double, 2>;
 
 // A material point, or the mean over a piece of the path, tied to candidate nodes: u = sum_k weight[k] u[node[k]]; weights sum to 1.
 struct Embedding {

@@ -24,8 +24,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 // Smallest pivot over the diagonal of M: below, the unknown is as good as dependent on those before it.
 constexpr double smallest_pivot = tolerance(1e-15, 1e-6);
 
-double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
-Vector2 normal(const Vector2& tangent) noexcept { return {-tangent[1], tangent[0]}; }
 double quadratic(const Block& g, const Vector2& v) noexcept {
   return v[0] * (g[0] * v[0] + g[1] * v[1]) + v[1] * (g[2] * v[0] + g[3] * v[1]);
 }

@@ -26,13 +26,11 @@
 #include <cstdint>
 #include <span>
 
+#include "common/contact/vector.hpp"
 #include "common/core/capacities.hpp"
 #include "common/core/precision.hpp"
 
 namespace trocar::contact {
-
-using Vector2 = std::array<double, 2>;
-using Block = std::array<double, 4>;  // xx, xy, yx, yy
 
 enum class State : std::uint8_t { Stuck, SlipForward, SlipBackward };
 

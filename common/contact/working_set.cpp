@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "common/contact/unresolved.hpp"
 #include "common/core/precision.hpp"
 
 namespace trocar::contact {
@@ -14,54 +14,11 @@ constexpr double point_regularisation = 1e-12;
 constexpr double resize_step = 1.0 / 128.0;  // of the spacing: how finely the last segment's weights follow the tip
 constexpr double soften_step = 1.0 / 512.0;  // and the softness of its tie
 constexpr double softness_of_short = 0.1;    // of its own compliance: about what a whole segment's is once its neighbours stick too
-// Of the jumps. Between 0.1 and 0.15 hardly any error that accuracy_benchmark measures changes by a third, but without them forces along
-// grid lines alternate.
-constexpr double jump_stabilisation = 0.15;
-// What planar elements miss, by tests/benchmarks/accuracy/unresolved.py, in plane stress with Poisson's ratios 0.3 to 0.48.
-//   along, across   Of the ridge along a line that crosses them: more than their interpolation would miss, as a share of that, times sin^2
-//                   of twice the angle to their edges; for an axial and for a lateral load.
-//   end             Of the end of a line of segments: `all` less `per_ridge` times the last one's ridge, in 1 / (mu t). Triangles' axial
-//   one is
-//                   that of a line along edges: at an angle it hardly depends on the ridge. Quadrilaterals' are rounded towards stiffness.
-//   excess          By how many of their edges a line of nodes seems to reach beyond its last one; askew: less, times the same sin^2.
-struct AtEnd {
-  double all, per_ridge;
-};
-struct Unresolved {
-  double along, across;
-  AtEnd end_along, end_across;
-  double excess_along, excess_across, excess_across_askew;
-};
-constexpr Unresolved of_triangles{0.4, -0.1, {0.1, 0.66}, {0.06, 0.2}, 0.6, 0.36, 0.0};
-constexpr Unresolved of_quadrilaterals{0.03, -0.4, {0.06, 0.53}, {0.02, 0.07}, 0.385, 0.22, 0.15};
-// A stuck line bears on its end like 1 / sqrt(distance), which a density that is constant over a segment cannot follow, and whose jump is
-// not to count. Without it the line seems shorter by up to a fifth of a segment. Shares of the line's own compliance A and of the jump's;
-// by the same program's plane without elements.
-constexpr double end_share_of_line = 1.0 / 6.0, end_share_of_jump = 1.0 / 3.0;
-// While a segment grows by its share g, its predecessor is an end less and less. In between, the pair's stiffness is to follow the depth as
-// it does between whole segments (accuracy_benchmark's paths, at depths it does not ask for): laterally g (1 - g) (a + b g^2) of A less;
-// axially a short segment is softer by c (1 - g)^4 in 1 / (mu t).
-constexpr double grown_half = 1.8, grown_late = 3.8, short_is_softer = 0.35;
-// A line of nodes: what the last one yields while the others are held, over what it does while the four before it are.
-constexpr double held_by_all = 0.97;
 // Of what the tissue's own compliance would give for the lateral force that is missing: a tip that a bevel carries aside approaches that
 // force, and a long step does not carry it beyond.
 constexpr double largest_aside = 0.2;
 constexpr int most_cells = 512;  // that one walk crosses
 
-Vector2 plus(const Vector2& a, const Vector2& b) noexcept { return {a[0] + b[0], a[1] + b[1]}; }
-Vector2 minus(const Vector2& a, const Vector2& b) noexcept { return {a[0] - b[0], a[1] - b[1]}; }
-Vector2 scaled(const Vector2& a, double factor) noexcept { return {a[0] * factor, a[1] * factor}; }
-double dot(const Vector2& a, const Vector2& b) noexcept { return a[0] * b[0] + a[1] * b[1]; }
-double length(const Vector2& a) noexcept { return std::hypot(a[0], a[1]); }
-void add(Block& to, const Block& what, double factor = 1.0) noexcept {
-  for (std::size_t k = 0; k < 4; ++k) to[k] += factor * what[k];
-}
-// Of a compliance along a unit vector and one across it, in the axes of the mesh.
-Block in_axes(const Vector2& t, double along, double across) noexcept {
-  const double shear = (along - across) * t[0] * t[1];
-  return {along * t[0] * t[0] + across * t[1] * t[1], shear, shear, along * t[1] * t[1] + across * t[0] * t[0]};
-}
 double overlap(double a0, double a1, double b0, double b1) noexcept { return std::max(0.0, std::min(a1, b1) - std::max(a0, b0)); }
 
 }  // namespace
@@ -163,97 +120,30 @@ std::size_t WorkingSet::make_row(const Embedding& at, std::size_t before) noexce
   return before + 1;
 }
 
-// sin^2 of twice the angle between a direction and a cell's edges, the mean over the two that meet most squarely.
-double WorkingSet::askew_to(const model::Cell& cell, const Vector2& direction) const noexcept {
-  double least = 2.0, askew = 0.0;
-  for (std::size_t k = 0; k < cell.count; ++k) {
-    const Vector2 at = tissue_->node_m[cell.node[k]];
-    const Vector2 a = minus(tissue_->node_m[cell.node[(k + 1) % cell.count]], at);
-    const Vector2 b = minus(tissue_->node_m[cell.node[(k + cell.count - 1) % cell.count]], at);
-    const double off_square = std::abs(dot(a, b)) / (length(a) * length(b));
-    if (off_square >= least) continue;
-    least = off_square;
-    const auto to = [&](const Vector2& edge) {
-      const double cosine = dot(edge, direction) / length(edge);
-      return 4.0 * cosine * cosine * (1.0 - cosine * cosine);
-    };
-    askew = 0.5 * (to(a) + to(b));
-  }
-  return askew;
-}
-
-// The edge of the cells, in the mean; of triangles, that of the squares that two of them make.
-double WorkingSet::cell_edge_m(const model::Cell& cell) const noexcept {
-  return tissue_->edge_length_m * (cell.count == 3 ? model::square_of_triangles : 1.0);
-}
-
-// A line load q bends the displacement sharply, by -q |d| / (2 C t) at the distance d, and elements that the line crosses cannot: on the
-// line they miss about q / (2 C t) sum w_k |d_k|, nothing where the line runs along edges. C is the shear modulus along the line, that of
-// uniaxial strain across it. And a density that alternates from segment to segment hardly moves elements of their size, though it moves
-// tissue: the jump of density to the predecessor counts. The end of the line is stiffer than its segments. A last segment shorter
-// than the elements moves them as one of their size would: it misses A ln(size / length), A = (1 / mu + 1 / C) / (4 pi t) the logarithm's
-// factor in the plane's point load (Kelvin). In a solid the force is spread over the needle's cross-section, which the mesh may resolve.
+// row_[i], of the segment between two points, is there without it; ends up in own_[i] but for the end of the line.
 void WorkingSet::add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept {
   end_[i] = {};
   if (tissue_->model == element::Model::Solid) return;
-  const Vector2 chord = minus(to_m, from_m);
-  const double length_m = length(chord);
-  const Vector2 t = scaled(chord, 1.0 / length_m);
-  const std::int32_t middle = geometry_.locate(plus(from_m, scaled(chord, 0.5)), tip_cell_);
+  const std::int32_t middle = geometry_.locate(plus(from_m, scaled(minus(to_m, from_m), 0.5)), tip_cell_);
   const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(middle < 0 ? tip_cell_ : middle)];
-  const Unresolved& unresolved = cell.count == 3 ? of_triangles : of_quadrilaterals;
-  const element::Elasticity c = element::elasticity(tissue_->model, tissue_->material[cell.material]);
-  const double shear = 1.0 / (c(2, 2) * tissue_->thickness_m), strain = 1.0 / (c(0, 0) * tissue_->thickness_m);
-  const double line = (shear + strain) / (4.0 * std::numbers::pi);
-  const double mixed = 2.0 * row_[i][1] * t[0] * t[1];
-  const double own_along = row_[i][0] * t[0] * t[0] + row_[i][3] * t[1] * t[1] + mixed;
-  const double own_across = row_[i][0] + row_[i][3] - own_along;
-
-  // The load's length is a whole segment's from the start: a shorter one is no line on the scale of the elements.
-  const double spacing = law_->spacing_m;
-  double distance_m = 0.0;
-  for (std::uint32_t k = 0; k < at.count; ++k) {
-    const Vector2 x = minus(geometry_.node_m(at.node[k]), from_m);
-    distance_m += at.weight[k] * std::abs(t[0] * x[1] - t[1] * x[0]);
-  }
-  const double ridge = std::max(0.0, distance_m) / (2.0 * spacing), askew = askew_to(cell, t);
-  const double ridge_along = ridge * (1.0 + askew * unresolved.along), ridge_across = ridge * (1.0 + askew * unresolved.across);
-  add(row_[i], in_axes(t, ridge_along * shear, ridge_across * strain));
-  const double resolved_m = std::min(spacing, cell_edge_m(cell));
-  if (length_m < resolved_m) add(row_[i], {line, 0.0, 0.0, line}, std::log(resolved_m / length_m));
-
-  // A line that leaves the tissue does not end. On segments shorter than the elements the ends are the elements'. Where these hardly
-  // yield, at a support or because they are all but incompressible (plane stress never is), the end is not to take what there is.
-  const double per_edge = cell_edge_m(cell) / spacing;
-  const double jump = jump_stabilisation * per_edge * per_edge;
-  ends_inside_ = tip_inside_;
-  const double whole = tip_inside_ ? std::min(1.0, 1.0 / (per_edge * per_edge)) : 0.0;
-  const double yields_along = whole * std::clamp(own_along / line - 1.5, 0.0, 1.0);
-  const double yields_across = whole * std::clamp(own_across / line - 1.5, 0.0, 1.0) * std::min(1.0, 4.0 * strain / shear);
-  const auto at_end = [&](const AtEnd& end, double ridge_there, double modulus) {
-    return (end.all - end.per_ridge * ridge_there) * shear - end_share_of_line * line - end_share_of_jump * jump * modulus;
-  };
-  end_[i] = {t, yields_along * at_end(unresolved.end_along, ridge_along, shear),
-             yields_across * at_end(unresolved.end_across, ridge_across, strain), yields_across * line};
-
-  const double grown = std::min(1.0, length_m / spacing), lacks = 1.0 - grown;
+  ends_inside_ = tip_inside_;  // a line that leaves the tissue does not end
+  const double spacing = law_->spacing_m, length_m = length(minus(to_m, from_m));
+  const Unresolved unresolved = contact::add_unresolved(row_[i], geometry_, *tissue_, cell, at, from_m, to_m, spacing, tip_inside_);
+  end_[i] = unresolved.end;
   if (i > 0) {
     // f_i - (l_i / l_(i-1)) f_(i-1): a segment that is still short neither holds its predecessor nor is held by it, which ends the line
     // as far as the short one does not yet.
-    const Block jumps = in_axes(t, jump * shear, jump * strain);
     const double share = length_m / (spacing * length(point_[i - 1].heading));
-    add(row_[i], jumps);
-    add(row_[i - 1], jumps, -share);
+    add(row_[i], unresolved.jump);
+    add(row_[i - 1], unresolved.jump, -share);
     Block before = own_[i - 1];
-    add(before, jumps, share * share);
-    const LineEnd& end = end_[i - 1];
-    add(before, in_axes(end.tangent, lacks * lacks * end.along,
-                        lacks * (end.across - grown * (grown_half + grown_late * grown * grown) * end.line)));
+    add(before, unresolved.jump, share * share);
+    add(before, before_end(end_[i - 1], std::min(1.0, length_m / spacing)));
     solver_.replace_own(i - 1, before);
-    add(row_[i], in_axes(t, whole * short_is_softer * lacks * lacks * lacks * lacks * shear, 0.0));
+    add(row_[i], unresolved.softer);
   }
   own_[i] = row_[i];
-  add(row_[i], in_axes(t, end_[i].along, end_[i].across));
+  add(row_[i], at_end(end_[i]));
 }
 
 void WorkingSet::push(const Point& point) noexcept {
@@ -279,7 +169,7 @@ void WorkingSet::pop() noexcept {
 Block WorkingSet::own_at_end(double softness, const Vector2& tangent) const noexcept {
   const std::size_t i = size() - 1;
   Block own = own_[i];
-  add(own, in_axes(end_[i].tangent, end_[i].along, end_[i].across));
+  add(own, at_end(end_[i]));
   add(own, in_axes(tangent, 0.0, softness));
   return own;
 }
@@ -288,7 +178,7 @@ Block WorkingSet::own_at_end(double softness, const Vector2& tangent) const noex
 Vector2 WorkingSet::yields_held(const Vector2& t) const noexcept {
   constexpr std::size_t few = 5;
   const std::size_t first = size() - std::min(size(), few), count = 2 * (size() - first);
-  const std::array<Vector2, 2> axes{t, {-t[1], t[0]}};
+  const std::array<Vector2, 2> axes{t, normal(t)};
   std::array<std::array<double, 2 * few>, 2 * few> lower{};  // Cholesky's
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t j = 0; j <= i; ++j) {
@@ -303,25 +193,15 @@ Vector2 WorkingSet::yields_held(const Vector2& t) const noexcept {
   return {along * along * across * across / (across * across + between * between), across * across};
 }
 
-// Of the last node that was moved onto the shaft, with the piece of the line from it to the tip. To a line of nodes it is the same to be
-// longer by the share e of its last gap, and to have its last node give way by -e / (1 + e) of what it yields while the others are held: at
-// e = -1 it were not there.
+// Of the last node that was moved onto the shaft, with the piece of the line from it to the tip.
 Block WorkingSet::own_at_tip() const noexcept {
   const std::size_t i = size() - 1;
-  if (i == 0 || !tip_inside_ || tissue_->model == element::Model::Solid) return own_[i];
-  const model::Cell& cell = tissue_->cell[static_cast<std::size_t>(tip_cell_)];
-  const Unresolved& unresolved = cell.count == 3 ? of_triangles : of_quadrilaterals;
-  const Vector2 t = point_[i].direction;
-  const double edge_m = cell_edge_m(cell);
-  const double beyond = soften_step * std::floor((path_m_ - point_[i].path_m) / (soften_step * edge_m));
-  const double gap = std::max(0.25, (point_[i].path_m - point_[i - 1].path_m) / edge_m);
-  const auto gives = [&](double excess) {
-    const double longer = std::clamp((beyond - excess) / gap, -0.75, 1.0);
-    return -held_by_all * longer / (1.0 + longer);
-  };
-  const double excess_across = unresolved.excess_across - unresolved.excess_across_askew * askew_to(cell, t);
   Block own = own_[i];
-  add(own, in_axes(t, yields_[0] * gives(unresolved.excess_along), yields_[1] * gives(excess_across)));
+  if (i == 0 || !tip_inside_ || tissue_->model == element::Model::Solid) return own;
+  const Point &last = point_[i], &before = point_[i - 1];
+  const Vector2 gives = gives_at_tip(*tissue_, tissue_->cell[static_cast<std::size_t>(tip_cell_)], last.direction, path_m_ - last.path_m,
+                                     last.path_m - before.path_m);
+  add(own, in_axes(last.direction, yields_[0] * gives[0], yields_[1] * gives[1]));
   return own;
 }
 

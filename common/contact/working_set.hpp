@@ -6,16 +6,9 @@
 //     tied by the shape functions integrated over it). The last segment ends at the tip; its weights follow the tip in steps of 1/128 of
 //     the spacing. While it is short its tie across the shaft is softened by a tenth of its own compliance times (spacing / length - 1),
 //     in steps of 1/512 of the spacing, so that beginning or leaving it does not kick. A segment keeps the course that was cut: coming
-//     back follows it. In planar tissue three things are added that elements and segments cannot follow
-//     (tests/benchmarks/accuracy_benchmark.cpp):
-//     ridge  that a line load makes of the displacement, about sum w_k |d_k| / (2 C t) per density, d_k the nodes' distances from the
-//            line. Without it an oblique needle is some 3 % too stiff on 80 x 80 elements.
-//     end    of the line, at the tip, on which it bears most, like 1 / sqrt(distance): without it stiffness wavers by some per cent as
-//            segments come and go.
-//     jump   of the density between neighbours, g h^2 / (C t) (q_i - q_(i-1)), g = 0.15, h the mesh's edge (Burman and Hansbo 2010,
-//            doi.org/10.1016/j.cma.2010.05.011): a sum of squares, so G stays positive; nothing for a constant density. Without it one
-//            force per edge is not inf-sup stable and alternates.
-//     displacement_m() is the elements' own, without either.
+//     back follows it. In planar tissue what elements and segments cannot follow is added (unresolved.hpp): without the
+//     ridge of a line load an oblique needle is some 3 % too stiff on 80 x 80 elements, without the jumps of the density forces alternate,
+//     without the end of the line stiffness wavers by some per cent as segments come and go. displacement_m() is the elements' own.
 //   Snap, Adapt: where the tip crosses a cell's edge, the nearer end of the edge becomes a contact: pulled onto the shaft, or moved there
 //     in the reference mesh; a node of the surface is not moved inwards. Contact j carries the path from half way to its predecessor to
 //     half way to its successor, the last one to the tip. Adapt, planar: elements make a line of nodes too long by a third of an edge or
@@ -44,6 +37,7 @@
 #include "common/contact/compliance.hpp"
 #include "common/contact/geometry.hpp"
 #include "common/contact/solver.hpp"
+#include "common/contact/unresolved.hpp"
 #include "common/core/capacities.hpp"
 #include "common/model/law.hpp"
 #include "common/model/tissue.hpp"
@@ -120,11 +114,6 @@ class WorkingSet {
     std::uint64_t used{};
     std::array<Block, capacity::contacts> block{};
   };
-  struct LineEnd {  // what is to be added to a segment's own compliance where the line ends, m/N
-    Vector2 tangent{};
-    double along{}, across{};
-    double line{};  // the line's own, as far as the end counts
-  };
   static constexpr std::size_t nodes_in_use = 48;
 
   [[nodiscard]] bool segments() const noexcept { return law_->method == Method::Embedded && law_->explicit_count == 0; }
@@ -133,8 +122,6 @@ class WorkingSet {
   void forget_couplings(std::size_t from_contact) noexcept;
   [[nodiscard]] Vector2 node_displacement(std::uint32_t node) noexcept;
   std::size_t make_row(const Embedding& at, std::size_t before) noexcept;
-  [[nodiscard]] double cell_edge_m(const model::Cell& cell) const noexcept;
-  [[nodiscard]] double askew_to(const model::Cell& cell, const Vector2& direction) const noexcept;
   void add_unresolved(const Embedding& at, const Vector2& from_m, const Vector2& to_m, std::size_t i) noexcept;
   [[nodiscard]] Block own_at_end(double softness, const Vector2& tangent) const noexcept;
   [[nodiscard]] Vector2 yields_held(const Vector2& t) const noexcept;

@@ -158,16 +158,18 @@ Answer fine_answer(const Path& path, double depth_m, int level, const std::vecto
 }
 
 Answer extrapolated(const Answer& coarser, const Answer& finer) {
-  constexpr double more = 1.0 / (2.9 - 1.0);
-  const auto beyond = [](const auto& from, const auto& to) { return to + more * (to - from); };
   Answer answer = finer;
-  answer.axial_n_per_m = beyond(coarser.axial_n_per_m, finer.axial_n_per_m);
-  answer.lateral_n_per_m = beyond(coarser.lateral_n_per_m, finer.lateral_n_per_m);
-  answer.slip_force_n = beyond(coarser.slip_force_n, finer.slip_force_n);
-  answer.tip_m = beyond(coarser.tip_m, finer.tip_m);
-  answer.axial_visible += more * (finer.axial_visible - coarser.axial_visible);
-  answer.lateral_visible += more * (finer.lateral_visible - coarser.lateral_visible);
-  answer.slip_visible_m += more * (finer.slip_visible_m - coarser.slip_visible_m);
+  const auto go_on = [](auto& to, const auto& from) {
+    constexpr double more = 1.0 / (2.9 - 1.0);
+    to += more * (to - from);
+  };
+  go_on(answer.axial_n_per_m, coarser.axial_n_per_m);
+  go_on(answer.lateral_n_per_m, coarser.lateral_n_per_m);
+  go_on(answer.slip_force_n, coarser.slip_force_n);
+  go_on(answer.tip_m, coarser.tip_m);
+  go_on(answer.axial_visible, coarser.axial_visible);
+  go_on(answer.lateral_visible, coarser.lateral_visible);
+  go_on(answer.slip_visible_m, coarser.slip_visible_m);
   return answer;
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What planar elements miss of a loaded line that crosses them: the constants of common/contact/working_set.cpp (Unresolved).
+"""What planar elements miss of a loaded line that crosses them: the constants of common/contact/unresolved.cpp.
 
 A periodic square of unit elements, plane stress, and a straight line through it. Nothing here knows trocar's solver or its benchmark.
   ridge   A line that closes on itself, loaded evenly, against its closed form -|d|/2 + d^2/(2 W): what the elements miss on the line,
@@ -9,7 +9,7 @@ A periodic square of unit elements, plane stress, and a straight line through it
           per ridge of the end segments.
   excess  A stuck line of nodes, moved onto it from where it crosses edges, against the same line on elements of a quarter of the size: by
           how many edges it seems too long at each end; lateral: less, times that sin^2.
-Needs numpy and scipy; takes four minutes.    unresolved.py [poisson's ratio, 0.48]
+Needs numpy and scipy; takes a minute or two.    unresolved.py [poisson's ratio, 0.48]
 """
 import sys
 
@@ -23,7 +23,7 @@ mu = 1.0
 elasticity = 2 * (1 + nu) * mu / (1 - nu * nu) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
 modulus = {"along": mu, "across": elasticity[0, 0]}
 line_share = (1 / modulus["along"] + 1 / modulus["across"]) / (4 * np.pi)
-jump, end_of_line, end_of_jump = 0.15, 1 / 6, 1 / 3  # as in working_set.cpp
+jump, end_of_line, end_of_jump = 0.15, 1 / 6, 1 / 3  # as in unresolved.cpp
 kinds = ("triangles", "quadrilaterals")
 square = [(0, 0), (1, 0), (1, 1), (0, 1)]
 gauss_at, gauss_weight = np.polynomial.legendre.leggauss(16)
