@@ -119,10 +119,11 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
   const bool given = plan.law.spacing_m > 0.0;
   // One force per edge would alternate along the path: the edges' averages hardly feel such a load (inf-sup). In planar tissue the contacts
   // are stabilised against it (contact/working_set.hpp); in a solid 1.5 edges keep it off, and 2 cost detail.
-  const double edges_per_segment = scene.tissue.model == fem::Model::Solid ? 1.5 : 1.0;
-  const double edge_m =
-      c.edge_length_m * (c.cell.front().count == 3 && scene.tissue.model != fem::Model::Solid ? model::square_of_triangles : 1.0);
-  if (!given) plan.law.spacing_m = std::max(edges_per_segment * edge_m, reach / static_cast<double>(capacity::contacts));
+  // A node method makes a contact where the needle crosses an edge.
+  const bool nodes = plan.law.method != contact::Method::Embedded;
+  const bool triangles = c.cell.front().count == 3 && !nodes;
+  const double edges_per_segment = scene.tissue.model == fem::Model::Solid ? 1.5 : triangles ? model::square_of_triangles : 1.0;
+  if (!given) plan.law.spacing_m = std::max(edges_per_segment * c.edge_length_m, reach / static_cast<double>(capacity::contacts));
   if (plan.law.explicit_count > capacity::contacts)
     throw fem::Error(
         fmt::format("contact.points_m has {} contacts and the capacity is {}; give fewer", plan.law.explicit_count, capacity::contacts));
@@ -144,8 +145,6 @@ void plan_contacts(const scene::Scene& scene, Plan& plan) {
       throw fem::Error(
           fmt::format("contact.points_m[{}] = ({}, {}) m lies on supported tissue, which cannot give way; move it", i, x[0], x[1]));
   }
-  // A node method makes a contact where the needle crosses an edge.
-  const bool nodes = plan.law.method != contact::Method::Embedded;
   const double spacing = nodes ? c.edge_length_m : plan.law.spacing_m;
   const double contacts = plan.law.explicit_count > 0 ? plan.law.explicit_count : std::ceil(reach / spacing * (1.0 - 1e-12));
   if (contacts > static_cast<double>(capacity::contacts))

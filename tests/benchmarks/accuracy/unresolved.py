@@ -18,7 +18,12 @@ import scipy.optimize
 import scipy.sparse
 import scipy.sparse.linalg
 
-nu = float(sys.argv[1]) if len(sys.argv) > 1 else 0.48
+try:
+    nu = float(sys.argv[1]) if len(sys.argv) > 1 else 0.48
+except ValueError:
+    nu = np.nan
+if len(sys.argv) > 2 or not 0.0 <= nu <= 0.9:
+    sys.exit(f"unresolved.py: {' '.join(sys.argv[1:])}: give one Poisson's ratio from 0 to 0.9, such as 0.48")
 mu = 1.0
 elasticity = 2 * (1 + nu) * mu / (1 - nu * nu) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
 modulus = {"along": mu, "across": elasticity[0, 0]}

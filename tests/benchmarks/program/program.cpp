@@ -6,6 +6,7 @@
 #include <exception>
 #include <fstream>
 #include <stdexcept>
+#include <system_error>
 
 namespace trocar::bench {
 
@@ -22,6 +23,12 @@ int run_program(const char* name, int count, char** argument, const std::functio
         fmt::print(stderr, "{}: unknown option \"{}\"; there are: --out FOLDER, --quick\n", name, argument[k]);
         return 2;
       }
+    }
+    std::error_code wrong;
+    std::filesystem::create_directories(options.out, wrong);
+    if (wrong) {
+      fmt::print(stderr, "{}: cannot make the folder {} ({}); choose another with --out\n", name, options.out.string(), wrong.message());
+      return 1;
     }
     return work(options);
   } catch (const std::exception& error) {
